@@ -1,5 +1,7 @@
 #include "coronaryMenuActions.h"
 
+#include "coronaryBuild.h"
+
 #include <pqPVApplicationCore.h>
 #include <pqPythonManager.h>
 
@@ -12,9 +14,19 @@
 coronaryMenuActions::coronaryMenuActions(QObject* parent)
   : QActionGroup(parent)
 {
-  this->Add("coronaryBuild", "Build from 4D CT",
-    "The whole pipeline on the selected image series; on a small phantom when there is nothing yet",
-    "build");
+  QAction* build = this->Add("coronaryBuild", "Build from 4D CT",
+    "The beating model of the selected image series; of a small phantom when there is nothing yet");
+  QObject::connect(build, &QAction::triggered, this,
+    [this, build]
+    {
+      if (!this->Build)
+      {
+        QWidget* menu = build->associatedWidgets().value(0);
+        this->Build = new coronaryBuild(menu ? menu->parentWidget()->window() : nullptr);
+      }
+      this->Build->show();
+      this->Build->raise();
+    });
   this->Add("coronaryCompare", "Compare Series",
     "The selected model over the selected truth, and its distance from it", "compare");
   this->Add("coronaryLook", "Look Along the Vessel",
@@ -34,13 +46,19 @@ coronaryMenuActions::coronaryMenuActions(QObject* parent)
 
 coronaryMenuActions::~coronaryMenuActions() = default;
 
-void coronaryMenuActions::Add(
-  const char* name, const char* text, const char* help, const char* function)
+QAction* coronaryMenuActions::Add(const char* name, const char* text, const char* help)
 {
   auto* action = new QAction(text, this);
   action->setObjectName(name);
   action->setToolTip(help);
   action->setStatusTip(help);
+  return action;
+}
+
+void coronaryMenuActions::Add(
+  const char* name, const char* text, const char* help, const char* function)
+{
+  QAction* action = this->Add(name, text, help);
   // With paraview.simple Python finds the modules of plugins.
   const QByteArray code =
     QByteArray("import paraview.simple\nimport coronary_menu\ncoronary_menu.") + function + "()\n";

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <utility>
 
 #include <unistd.h>
@@ -13,6 +14,7 @@ namespace
 {
 constexpr int BarWidth = 28;
 constexpr auto BarInterval = std::chrono::milliseconds(100);
+constexpr auto LineInterval = std::chrono::milliseconds(500);
 
 std::string Duration(double seconds)
 {
@@ -35,6 +37,7 @@ ProgressDisplay::ProgressDisplay(std::string unit, int steps, bool quiet)
   , Steps(steps)
   , Quiet(quiet)
   , Terminal(isatty(STDERR_FILENO) != 0)
+  , Lines(!Terminal && std::getenv("DYNAMICCORONARY_PROGRESS") != nullptr)
 {
 }
 
@@ -71,6 +74,11 @@ void ProgressDisplay::Update(double fraction)
   if (!this->Quiet && this->Terminal && Clock::now() - this->LastDrawn >= BarInterval)
   {
     this->DrawBar();
+  }
+  else if (!this->Quiet && this->Lines && Clock::now() - this->LastDrawn >= LineInterval)
+  {
+    this->LastDrawn = Clock::now();
+    std::fprintf(stderr, "progress %.3f\n", (this->Step + this->Fraction) / this->Steps);
   }
 }
 

@@ -41,6 +41,7 @@ private:
   const int Steps;
   const bool Quiet;
   const bool Terminal;
+  const bool Lines; ///< for a program that shows them: DYNAMICCORONARY_PROGRESS
   int Step = 0;
   double Fraction = 0.0; ///< of the step
   std::string Detail;

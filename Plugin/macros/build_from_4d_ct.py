@@ -1,11 +1,10 @@
-"""Dynamic Coronary: build from 4D CT. The beating coronary arteries of a gated series, stage by stage, in ParaView.
+"""Dynamic Coronary: build from 4D CT. The beating coronary arteries of a gated series, stage by stage, as filters in ParaView.
 
-From the menu (Dynamic Coronary, Build from 4D CT), or as a macro: select the image series in the pipeline browser first;
-with an empty pipeline browser a small phantom is made. From Python: `import build_from_4d_ct;
-build_from_4d_ct.build(source)`.
+From Python: `import build_from_4d_ct; build_from_4d_ct.build(source)`; or as a macro: select the image series in the
+pipeline browser first; with an empty pipeline browser a small phantom is made.
 
-The stages and their settings are those of `coronary-pipeline run`, and give the same points. Needs the
-DynamicCoronary plugin.
+The stages and their settings are those of `coronary-pipeline run`, and give the same points. ParaView does not answer
+meanwhile: the menu's entry leaves the work to that program (build_by_program). Needs the DynamicCoronary plugin.
 """
 import os
 
@@ -130,6 +129,8 @@ def build(source, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), largest_rad
     add("wall", simple.GenerateSurfaceNormals(boundary, registrationName="14 Wall", FeatureAngle=60.0))
     if show:
         made["layout"], made["views"] = show_model(made, times, size)
+        for _ in made["frames"]:
+            pass
     return made
 
 
@@ -173,11 +174,11 @@ def require_vessels(tree, largest_radius):
 
 
 def greatest_displacement(lines, times):
-    """Of moving lines: how far, mm, and when."""
+    """Of moving lines, mm."""
     def at(time):
         lines.UpdatePipeline(time)
         return lines.PointData["Displacement"].GetRange(-1)[1]
-    return max((at(time), -time) for time in times)
+    return max(at(time) for time in times)
 
 
 def show_model(made, times, size=None):
@@ -186,14 +187,12 @@ def show_model(made, times, size=None):
     axial, cell = views.split(layout, 0, 0.55)
     named, _ = views.split(layout, cell, 0.5, downwards=True)
     moving = "moved" in made
-    scene = simple.GetAnimationScene()
-    scene.UpdateAnimationUsingDataTimeSteps()
+    steps = views.ready_to_play()
     box = list(made["tree"].GetDataInformation(0).GetBounds())
 
     wall = simple.Show(made["wall"], front, "GeometryRepresentation")
     if moving:
-        far, when = greatest_displacement(made["lines"], times)
-        scene.AnimationTime = -when
+        far = greatest_displacement(made["lines"], times)
         views.colour_by(wall, front, "Displacement", "displacement from the reference phase (mm)",
                         0.0, far or 1.0)
     else:
@@ -201,17 +200,10 @@ def show_model(made, times, size=None):
     views.look_from_the_front(front, box)
 
     centre = [0.5 * (low + high) for low, high in zip(box[::2], box[1::2])]
-    plane = {"SliceType": "Plane"}
-    cut = simple.Slice(made["source"], registrationName="Axial slice", **plane)
-    rim = simple.Slice(made["wall"], registrationName="Wall in the slice", **plane)
-    for one in (cut, rim):
-        one.SliceType.Origin = centre
-        one.SliceType.Normal = [0.0, 0.0, 1.0]
-        one.Triangulatetheslice = 0
-    image = simple.Show(cut, axial, "GeometryRepresentation")
+    cut, height = views.axial_slice(made["source"], centre, "Axial slice")
+    rim = views.rim_in_slice(made["wall"], centre, height, "Wall in the slice")
     array = views.image_array(made["reference"])
-    views.grey_slice(image, array, *views.grey_window(made["reference"], array, HOUNSFIELD))
-    image.SetScalarBarVisibility(axial, False)
+    views.show_slice(cut, axial, array, *views.grey_window(made["reference"], array, HOUNSFIELD))
     shown = simple.Show(rim, axial, "GeometryRepresentation")
     views.plain(shown, views.WALL)
     shown.LineWidth = 2.5
@@ -219,8 +211,8 @@ def show_model(made, times, size=None):
 
     tree = simple.Show(made["lines"], named, "GeometryRepresentation")
     tree.LineWidth = 4.0
-    views.name_segments(made["lines"], tree, named)
     views.look_from_the_front(named, box)
+    made["names"] = views.name_segments(made["lines"], tree, named)
 
     if times:
         views.note_phase((front, axial, named), made["lines"])
@@ -231,6 +223,7 @@ def show_model(made, times, size=None):
         print("Dynamic Coronary: %s." % source.GetValue(0))
     simple.SetActiveView(front)
     simple.SetActiveSource(made["wall"])
+    made["steps"], made["frames"] = len(steps), views.frames((front, axial, named), steps)
     for view in (front, axial, named):
         simple.Render(view)
     return layout, (front, axial, named)
@@ -239,24 +232,36 @@ def show_model(made, times, size=None):
 def open_result(folder, series, size=None):
     """Shows the folder of a `coronary-pipeline run` beside its images, as build() shows what it made.
 
+    series   the images: a source, or what *Gated Image Reader* opens
     RuntimeError when one of the files is missing.
     """
     views.require_plugin()
     paths = [os.path.join(folder, "centerline.vtp"), os.path.join(folder, "motion", "centerline.pvd"),
-             os.path.join(folder, "motion.pvd"), series]
-    for path in paths:
+             os.path.join(folder, "motion.pvd")]
+    for path in paths + ([series] if isinstance(series, str) else []):
         if not os.path.isfile(path):
             raise RuntimeError("'%s' is missing: a finished run and its images are needed." % path)
-    tree = simple.XMLPolyDataReader(registrationName="Named trees", FileName=[paths[0]])
+    tree = opened_once("Named trees", simple.XMLPolyDataReader, FileName=[paths[0]])
     lines = simple.PVDReader(registrationName="Centerlines in time", FileName=paths[1])
     moved = simple.PVDReader(registrationName="Beating surface", FileName=paths[2])
-    source = simple.GatedImageReader(registrationName="Images", FileNames=[series])
+    source = series
+    if isinstance(series, str):
+        source = simple.GatedImageReader(registrationName="Images", FileNames=[series])
     wall = simple.GenerateSurfaceNormals(moved, registrationName="Wall", FeatureAngle=60.0)
     made = {"source": source, "reference": source, "tree": tree, "lines": lines, "moved": moved, "wall": wall}
-    for proxy in (source, tree, lines, wall):
+    for proxy in (views.proxy_of(source), tree, lines, wall):
         proxy.UpdatePipeline()
-    made["layout"], made["views"] = show_model(made, views.times_of(source), size)
+    made["layout"], made["views"] = show_model(made, views.times_of(lines), size)
     return made
+
+
+def opened_once(name, reader, **files):
+    """A reader of files; the one of that name that reads them already, if there is one."""
+    for known in simple.GetSources().values():
+        if views.name_of(known) == name and all(
+                list(getattr(known, key, [])) == value for key, value in files.items()):
+            return known
+    return reader(registrationName=name, **files)
 
 
 def example():

@@ -18,8 +18,8 @@ COARSE = {"Seed": 1, "CenterlineSpacing": 4.0}
 
 def start(source, time):
     """The animation with the time steps there are, at the one of a source next to `time`, which is returned."""
+    views.ready_to_play()
     scene = simple.GetAnimationScene()
-    scene.UpdateAnimationUsingDataTimeSteps()
     scene.AnimationTime = min(views.times_of(source), key=lambda step: abs(step - time))
     return scene.AnimationTime
 
@@ -40,32 +40,28 @@ def phantom(size=None):
     axial, _ = views.split(layout, 0, 0.55)
     source = simple.CoronaryPhantom(registrationName="Coronary Phantom", Seed=1, Spacing=[0.8, 0.8, 0.8],
                                     SurfaceSpacing=0.6)
-    source.UpdatePipeline(REST)
-    start(source, REST)
+    steps = views.ready_to_play()
+    source.UpdatePipeline(*steps[:1])
     box = list(source.GetDataInformation(SURFACE).GetBounds())
     centre = [0.5 * (low + high) for low, high in zip(box[::2], box[1::2])]
 
     lumen = simple.OutputPort(source, SURFACE)
     views.plain(simple.Show(lumen, front, "GeometryRepresentation"), views.WALL)
-    cut = simple.Slice(simple.OutputPort(source, IMAGE), registrationName="Axial slice", SliceType="Plane")
-    rim = simple.Slice(lumen, registrationName="Lumen in the slice", SliceType="Plane")
-    for one in (cut, rim):
-        one.SliceType.Origin = centre
-        one.SliceType.Normal = [0.0, 0.0, 1.0]
-        one.Triangulatetheslice = 0
+    cut, height = views.axial_slice(simple.OutputPort(source, IMAGE), centre, "Axial slice")
+    rim = views.rim_in_slice(lumen, centre, height, "Lumen in the slice")
     views.look_along(front, [0.2516, 0.8555, -0.4529], [0.0, 0.0, 1.0], box, 1.3)
     views.look_from_the_feet(axial, box)
     for view in (front, axial):
-        image = simple.Show(cut, view, "GeometryRepresentation")
-        views.grey_slice(image, "HU", *HOUNSFIELD)
-        image.SetScalarBarVisibility(view, False)
-    simple.Show(cut, axial).SetScalarBarVisibility(axial, True)
+        image = views.show_slice(cut, view, "HU", *HOUNSFIELD)
+    image.SetScalarBarVisibility(axial, True)
     views.legend(axial, "HU", "CT (HU)", "%-#.0f")
     ring = simple.Show(rim, axial, "GeometryRepresentation")
     views.plain(ring, views.WALL)
     ring.LineWidth = 2.5
-    views.note_phase((front, axial), source)
+    views.note_phase((front, axial), cut)  # of the source it would be the whole image
     views.note(front, "Phantom 1: the true lumen, and its CT", "What is shown")
+    for _ in views.frames((front, axial), steps):
+        pass
     return finish({"phantom": source, "slice": cut, "rim": rim}, layout, (front, axial), source)
 
 

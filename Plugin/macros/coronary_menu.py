@@ -1,7 +1,6 @@
 """What the entries of the menu Dynamic Coronary call. One message for a fault, instead of a Python traceback."""
 from paraview import print_error
 
-import build_from_4d_ct
 import compare_series
 import coronary_examples
 import look_along_vessel
@@ -17,7 +16,6 @@ def _entry(work):
     return call
 
 
-build = _entry(lambda: build_from_4d_ct.build(build_from_4d_ct.selected_series()))
 compare = _entry(lambda: compare_series.compare(*compare_series.selected_series()))
 look = _entry(look_along_vessel.look_at_selected)
 phantom = _entry(coronary_examples.phantom)

@@ -1,5 +1,9 @@
 """What the scripts of the menu Dynamic Coronary share: views, colours, legends, notes."""
+import functools
+import sys
+
 from paraview import servermanager, simple
+from paraview.modules.vtkRemotingViews import vtkPVOpenGLInformation
 
 WALL = [0.80, 0.16, 0.16]
 LINE = [1.0, 0.85, 0.2]
@@ -10,6 +14,22 @@ SEGMENTS = [[0.84, 0.15, 0.16], [0.12, 0.47, 0.71], [0.17, 0.63, 0.17], [1.00, 0
             [0.55, 0.34, 0.29], [0.89, 0.47, 0.76], [0.50, 0.50, 0.50], [0.74, 0.74, 0.13], [0.09, 0.75, 0.81]]
 PHASE = "{time:.0f} % of the R-R interval"
 RADIUS = "MaximumInscribedSphereRadius"
+# Of the names beside a tree: points of the font, and pixels a letter and a line of it take.
+NAME_SIZE, LETTER, LINE_HEIGHT = 15, 10.0, 18.0
+# One vertex a name. A filter, so that the names move with the tree, and are in a state.
+NAMES = """
+from vtkmodules.vtkCommonCore import vtkPoints, vtkStringArray
+lines, names = self.GetPolyDataInput(), self.GetPolyDataOutput()
+points, labels = vtkPoints(), vtkStringArray()
+labels.SetName("SegmentLabel")
+names.AllocateEstimate(1, 1)
+for number, label in %r:
+    if number < lines.GetNumberOfPoints():
+        names.InsertNextCell(1, 1, [points.InsertNextPoint(lines.GetPoint(number))])
+        labels.InsertNextValue(label)
+names.SetPoints(points)
+names.GetPointData().AddArray(labels)
+"""
 
 
 def require_plugin():
@@ -53,12 +73,22 @@ def look_along(view, direction, up, box, zoom=1.25):
     radius = 0.5 * sum((high - low) ** 2 for low, high in zip(box[::2], box[1::2])) ** 0.5
     view.UseColorPaletteForBackground = 0
     view.Background = WHITE
+    if drawn_by_software():
+        view.UseFXAA = 0  # more than half of the time of a frame
     view.OrientationAxesLabelColor = BLACK
     view.CameraParallelProjection = 1
     view.CameraFocalPoint = centre
     view.CameraPosition = [middle - 4.0 * radius * part for middle, part in zip(centre, direction)]
     view.CameraViewUp = up
     view.CameraParallelScale = radius / zoom
+
+
+@functools.lru_cache(maxsize=None)
+def drawn_by_software():
+    """Whether the client has no graphics card to draw with."""
+    information = vtkPVOpenGLInformation()
+    servermanager.ActiveConnection.Session.GatherInformation(servermanager.vtkPVSession.CLIENT, information, 0)
+    return any(name in information.GetRenderer().lower() for name in ("llvmpipe", "softpipe", "swrast", "swr"))
 
 
 def look_from_the_front(view, box, zoom=1.25):
@@ -117,6 +147,100 @@ def grey_slice(shown, array, low, high):
     transfer.ApplyPreset("Grayscale", True)
     transfer.RescaleTransferFunction(low, high)
     transfer.AutomaticRescaleRangeMode = "Never"
+
+
+def axial_slice(source, place, name):
+    """The plane of voxels next to a place, and its height in mm. Of each phase no more than that is read or computed.
+
+    The planes of an oblique image are not axial: that is cut at the place.
+    """
+    port = source.Port if is_port(source) else 0
+    whole = list(proxy_of(source).GetDataInformation(port).GetExtent())
+    plane = simple.ExtractSubset(source, registrationName=name)
+    heights = []
+    for number in whole[4:]:
+        plane.VOI = whole[:4] + [number, number]
+        plane.UpdatePipeline()
+        low, high = plane.GetDataInformation().GetBounds()[4:]
+        if high - low > 1e-3:
+            simple.Delete(plane)
+            cut = simple.Slice(source, registrationName=name, SliceType="Plane", Triangulatetheslice=0)
+            cut.SliceType.Origin, cut.SliceType.Normal = place, [0.0, 0.0, 1.0]
+            return cut, place[2]
+        heights.append(low)
+    steps = whole[5] - whole[4]
+    step = (heights[1] - heights[0]) / steps if steps else 1.0
+    number = min(max(round((place[2] - heights[0]) / step), 0), steps)
+    plane.VOI = whole[:4] + [whole[4] + number] * 2
+    return plane, heights[0] + number * step
+
+
+def show_slice(cut, view, array, low, high):
+    """A slice of an image in grey; as a picture, which is drawn faster than as many squares, where it lies along x and y."""
+    image = fetched(cut)
+    if image.IsA("vtkImageData") and image.GetDirectionMatrix().IsIdentity():
+        shown = simple.Show(cut, view, "UniformGridRepresentation")
+        shown.SetRepresentationType("Slice")
+    else:
+        shown = simple.Show(cut, view, "GeometryRepresentation")
+    grey_slice(shown, array, low, high)
+    shown.SetScalarBarVisibility(view, False)
+    return shown
+
+
+def rim_in_slice(surface, place, height, name):
+    """Where a surface meets the slice at that height."""
+    rim = simple.Slice(surface, registrationName=name, SliceType="Plane", Triangulatetheslice=0)
+    rim.SliceType.Origin, rim.SliceType.Normal = [place[0], place[1], height], [0.0, 0.0, 1.0]
+    return rim
+
+
+def ready_to_play():
+    """The animation has the time steps of the data, stands at the first and loops; each frame is computed once.
+
+    Returns the steps."""
+    scene = simple.GetAnimationScene()
+    scene.UpdateAnimationUsingDataTimeSteps()
+    scene.Loop = 1
+    simple.GetSettingsProxy("GeneralSettings").CacheGeometryForAnimation = 1
+    steps = scene.TimeKeeper.TimestepValues
+    steps = list(steps) if hasattr(steps, "__len__") else [steps]
+    if steps:
+        scene.AnimationTime = steps[0]
+    return steps
+
+
+def frames(shown, steps):
+    """Computes what views show at each step, one a turn, and keeps it: to play is to draw, then.
+
+    Ends when another frame is asked for meanwhile: playing keeps frames, too.
+    """
+    scene = simple.GetAnimationScene()
+    animation, now, asked = scene.SMProxy.GetClientSideObject(), scene.AnimationTime, []
+
+    def update(time):
+        for view in shown:
+            view.UseCache, view.CacheKey, view.ViewTime = 1, time, time
+            view.Update()
+
+    # Before ParaView's own observer, which lets the window live, and this go on, within a frame.
+    observer = animation.AddObserver("AnimationCueTickEvent", lambda *_: asked.append(True), 100.0)
+    try:
+        for number, time in enumerate(steps):
+            if asked:
+                return
+            update(time)
+            yield number + 1
+    finally:
+        if not sys.is_finalizing():
+            animation.RemoveObserver(observer)
+            if not asked:
+                update(now)
+                for view in shown:
+                    view.UseCache = 0
+            else:
+                for view in shown:
+                    view.ViewTime = scene.AnimationTime
 
 
 def note(view, words, name, place="Upper Right Corner", size=16):
@@ -198,13 +322,43 @@ def grey_window(source, array, usual):
     return usual if low < -100.0 and high > usual[1] / 2.0 else (low, high)
 
 
+def name_places(lines, millimetres):
+    """A point of each name's lines at which it is written: near their middle, where no other name is, from the front.
+
+    `millimetres` a pixel. Returns numbers of points and names.
+    """
+    labels = lines.GetCellData().GetAbstractArray("SegmentLabel")
+    numbers = {}
+    for cell in range(lines.GetNumberOfCells()):
+        name = labels.GetValue(cell)
+        if name:
+            ids = lines.GetCell(cell).GetPointIds()
+            numbers.setdefault(name, []).extend(ids.GetId(n) for n in range(ids.GetNumberOfIds()))
+    places, boxes = [], []
+    for name, points in sorted(numbers.items(), key=lambda item: len(item[1])):
+        wide, high = LETTER * len(name) * millimetres, LINE_HEIGHT * millimetres
+
+        def cost(number, count=len(points)):
+            x, _, z = lines.GetPoint(points[number])
+            covered = sum(max(0.0, 0.5 * (wide + across) - abs(x - middle)) * max(0.0, high - abs(z - height))
+                          for middle, height, across in boxes) / (wide * high)
+            return covered + 0.01 * abs(number / count - 0.5)
+
+        best = points[min(range(0, len(points), max(1, len(points) // 50)), key=cost)]
+        x, _, z = lines.GetPoint(best)
+        boxes.append((x, z, wide))
+        places.append((best, name))
+    return places
+
+
 def name_segments(source, shown, view):
     """Colours of a named tree's lines by their SCCT segments, and the names beside them.
 
-    `shown` is the representation of `source` in `view`. The names are labels of a selection: another selection takes
-    their place.
+    `shown` is the representation of `source` in `view`, which looks from the front already. The names are labels of a
+    selection, of the source that is returned: another selection takes their place.
     """
-    ids = fetched(source).GetCellData().GetArray("SegmentIds")
+    lines = fetched(source)
+    ids = lines.GetCellData().GetArray("SegmentIds")
     segments = sorted({int(ids.GetTuple1(n)) for n in range(ids.GetNumberOfTuples())})
     simple.ColorBy(shown, ("CELLS", "SegmentIds"))
     transfer = simple.GetColorTransferFunction("SegmentIds")
@@ -214,12 +368,18 @@ def name_segments(source, shown, view):
     transfer.IndexedColors = [part for n in range(len(segments)) for part in SEGMENTS[n % len(SEGMENTS)]]
     transfer.IndexedOpacities = [1.0] * len(segments)
     shown.SetScalarBarVisibility(view, False)
+    places = name_places(lines, 2.0 * view.CameraParallelScale / max(view.ViewSize[1], 1))
+    names = simple.ProgrammableFilter(source, registrationName="Names", OutputDataSetType="vtkPolyData",
+                                      Script=NAMES % places)
+    written = simple.Show(names, view, "GeometryRepresentation")
+    plain(written, BLACK)
     active = simple.GetActiveSource()
-    simple.SetActiveSource(source)
-    simple.QuerySelect(QueryString="(id >= 0)", FieldType="CELL")
+    simple.SetActiveSource(names)
+    simple.QuerySelect(QueryString="(id >= 0)", FieldType="POINT")
     simple.SetActiveSource(active)
-    shown.SelectionOpacity = 0.0
-    shown.SelectionCellLabelVisibility = 1
-    shown.SelectionCellFieldDataArrayName = "SegmentLabel"
-    shown.SelectionCellLabelColor = BLACK
-    shown.SelectionCellLabelFontSize = 15
+    written.SelectionOpacity = 0.0
+    written.SelectionPointLabelVisibility = 1
+    written.SelectionPointFieldDataArrayName = "SegmentLabel"
+    written.SelectionPointLabelColor = BLACK
+    written.SelectionPointLabelFontSize = NAME_SIZE
+    return names

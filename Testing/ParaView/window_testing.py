@@ -2,11 +2,12 @@
 import ctypes
 import os
 import subprocess
+import time
 import traceback
 
 from paraview import simple
 
-from coronary_testing import require_picture
+from coronary_testing import require, require_picture
 
 FOLDER = os.environ["DYNAMICCORONARY_TEST_FOLDER"]
 
@@ -45,6 +46,62 @@ def near(a, b, tolerance):
     return len(a) == len(b) and all(abs(x - y) < tolerance for x, y in zip(a, b))
 
 
+def live(seconds, until=lambda: False):
+    """Lets the window live, which it does not while the Python shell works; the longest turn, s, and how many there were."""
+    # QCoreApplication::processEvents(flags, milliseconds); with Python's lock, which what is called there takes for granted.
+    turn = getattr(ctypes.PyDLL("libQt5Core.so.5"),
+                   "_ZN16QCoreApplication13processEventsE6QFlagsIN10QEventLoop17ProcessEventsFlagEEi")
+    end, longest, turns = time.monotonic() + seconds, 0.0, 0
+    while time.monotonic() < end and not until():
+        start = time.monotonic()
+        turn(0, 50)
+        longest, turns = max(longest, time.monotonic() - start), turns + 1
+        time.sleep(0.01)
+    return longest, turns
+
+
+class Player:
+    """Watches the animation from now on, and stops it after some laps."""
+
+    def __init__(self, laps):
+        self.scene = simple.GetAnimationScene()
+        self.steps = list(self.scene.TimeKeeper.TimestepValues)
+        self.frames = []  # of each: when, processor time, time step
+        self.ended = False
+        self.object = self.scene.SMProxy.GetClientSideObject()
+        self.playing = False
+        wanted = laps * len(self.steps)
+
+        def frame(*_):
+            if self.playing:
+                self.frames.append((time.monotonic(), time.process_time(), self.scene.AnimationTime))
+                if len(self.frames) >= wanted:
+                    self.scene.SMProxy.InvokeCommand("Stop")
+
+        def begin(*_):
+            self.playing = True
+
+        def end(*_):
+            self.playing, self.ended = False, True
+            for observer in self.observers:
+                self.object.RemoveObserver(observer)
+
+        self.observers = [self.object.AddObserver(*pair) for pair in (
+            ("AnimationCueTickEvent", frame), ("StartEvent", begin), ("EndEvent", end))]
+
+    def require_played(self, steps, seconds):
+        """It played so many steps from the first on, in a loop, and half of the frames took less than `seconds` of a processor."""
+        require(self.ended and len(self.steps) == steps, "ended %s, steps %s" % (self.ended, self.steps))
+        times = [frame[2] for frame in self.frames]
+        require(len(times) > steps + 1 and times[:steps] == self.steps and times[steps] == self.steps[0],
+                "it played %s of %s" % (times, self.steps))
+        took = sorted(b[1] - a[1] for a, b in zip(self.frames, self.frames[1:]))
+        spent = self.frames[-1][0] - self.frames[0][0]
+        os.write(1, ("%.1f frames a second, %.3f s of a processor each\n" % (
+            (len(times) - 1) / spent, took[len(took) // 2])).encode())
+        require(took[len(took) // 2] < seconds, "a frame takes %.2f s" % took[len(took) // 2])
+
+
 class KeyEvent(ctypes.Structure):
     """XKeyEvent of Xlib."""
     _fields_ = [("type", ctypes.c_int), ("serial", ctypes.c_ulong), ("send_event", ctypes.c_int),
@@ -69,6 +126,16 @@ class Desktop:
         """The pointer to a place of the screen."""
         self.x.XWarpPointer(self.display, 0, ctypes.c_ulong(self.root), 0, 0, 0, 0, int(x), int(y))
         self.x.XSync(self.display, 0)
+
+    def click(self, x, y):
+        """A real click of the left button, as of the user's mouse."""
+        tester = ctypes.CDLL("libXtst.so.6")
+        tester.XTestFakeMotionEvent(self.display, -1, int(x), int(y), ctypes.c_ulong(0))
+        for pressed in (1, 0):
+            tester.XTestFakeButtonEvent(self.display, 1, pressed, ctypes.c_ulong(0))
+        self.x.XSync(self.display, 0)
+        # Until the window has it.
+        time.sleep(0.2)
 
     def focus(self):
         """Gives the window under the pointer the focus, and returns it."""

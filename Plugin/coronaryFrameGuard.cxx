@@ -1,0 +1,143 @@
+#include "coronaryFrameGuard.h"
+
+#include <pqAnimationManager.h>
+#include <pqAnimationScene.h>
+#include <pqPVApplicationCore.h>
+
+#include <vtkCommand.h>
+#include <vtkSMProxy.h>
+
+#include <QApplication>
+#include <QKeyEvent>
+#include <QMouseEvent>
+#include <QWheelEvent>
+
+namespace
+{
+/// Of what the user does; null: nothing of that.
+std::unique_ptr<QEvent> Copy(const QEvent& event)
+{
+  switch (event.type())
+  {
+    case QEvent::MouseButtonPress:
+    case QEvent::MouseButtonRelease:
+    case QEvent::MouseButtonDblClick:
+      return std::make_unique<QMouseEvent>(static_cast<const QMouseEvent&>(event));
+    case QEvent::KeyPress:
+    case QEvent::KeyRelease:
+      return std::make_unique<QKeyEvent>(static_cast<const QKeyEvent&>(event));
+    case QEvent::Wheel:
+      return std::make_unique<QWheelEvent>(static_cast<const QWheelEvent&>(event));
+    default:
+      return nullptr;
+  }
+}
+}
+
+coronaryFrameGuard::coronaryFrameGuard(QObject* parent)
+  : QObject(parent)
+{
+}
+
+coronaryFrameGuard::~coronaryFrameGuard()
+{
+  this->Watch(nullptr);
+}
+
+void coronaryFrameGuard::Start()
+{
+  pqPVApplicationCore* core = pqPVApplicationCore::instance();
+  pqAnimationManager* manager = core ? core->animationManager() : nullptr;
+  if (!manager)
+  {
+    return;
+  }
+  QObject::connect(
+    manager, &pqAnimationManager::activeSceneChanged, this, &coronaryFrameGuard::Watch);
+  this->Watch(manager->getActiveScene());
+  QCoreApplication::instance()->installEventFilter(this);
+}
+
+void coronaryFrameGuard::Stop()
+{
+  QCoreApplication::instance()->removeEventFilter(this);
+  this->Watch(nullptr);
+}
+
+void coronaryFrameGuard::Watch(pqAnimationScene* scene)
+{
+  if (this->Scene)
+  {
+    for (const unsigned long observer : this->Observers)
+    {
+      this->Scene->RemoveObserver(observer);
+    }
+  }
+  this->Observers.clear();
+  this->Playing = this->Ticking = false;
+  this->Scene = scene ? vtkObject::SafeDownCast(scene->getProxy()->GetClientSideObject()) : nullptr;
+  if (!this->Scene)
+  {
+    return;
+  }
+  // ParaView's own observer, which handles events, stands between the two of a tick.
+  constexpr float Before = 1.0F;
+  constexpr float After = -1.0F;
+  this->Observers = {
+    this->Scene->AddObserver(vtkCommand::StartEvent, this, &coronaryFrameGuard::BeginPlay, Before),
+    this->Scene->AddObserver(vtkCommand::EndEvent, this, &coronaryFrameGuard::EndPlay, Before),
+    this->Scene->AddObserver(
+      vtkCommand::AnimationCueTickEvent, this, &coronaryFrameGuard::BeginTick, Before),
+    this->Scene->AddObserver(
+      vtkCommand::AnimationCueTickEvent, this, &coronaryFrameGuard::EndTick, After),
+  };
+}
+
+void coronaryFrameGuard::BeginPlay()
+{
+  this->Playing = true;
+}
+
+void coronaryFrameGuard::EndPlay()
+{
+  this->Playing = false;
+}
+
+void coronaryFrameGuard::BeginTick()
+{
+  // While it plays there is nothing that starts another tick, and pause has to work.
+  this->Ticking = !this->Playing;
+}
+
+void coronaryFrameGuard::EndTick()
+{
+  this->Ticking = false;
+  for (auto& kept : this->Kept)
+  {
+    if (kept.first)
+    {
+      QCoreApplication::postEvent(kept.first, kept.second.release());
+    }
+  }
+  this->Kept.clear();
+}
+
+bool coronaryFrameGuard::eventFilter(QObject* receiver, QEvent* event)
+{
+  if (!this->Ticking)
+  {
+    return false;
+  }
+  if (event->type() == QEvent::Shortcut || event->type() == QEvent::ShortcutOverride)
+  {
+    return true;
+  }
+  // Windows hand on to their widgets.
+  std::unique_ptr<QEvent> copy = receiver->isWindowType() ? Copy(*event) : nullptr;
+  if (!copy)
+  {
+    return false;
+  }
+  this->Kept.emplace_back(receiver, std::move(copy));
+  return true;
+}
