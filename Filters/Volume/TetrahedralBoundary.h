@@ -12,8 +12,8 @@
 
 namespace coronary
 {
-/// Faces of one tetrahedron only, looking outwards, with that tetrahedron; in the order of the
-/// tetrahedra. Positions do not count: a mesh that moves keeps its boundary.
+/// Faces of one tetrahedron only, looking outwards, with that tetrahedron; one beside the other, from that of the
+/// first tetrahedron on. Positions do not count: a mesh that moves keeps its boundary.
 std::vector<std::pair<Triangle, std::int64_t>> BoundaryFaces(
   const std::vector<Tetrahedron>& tetrahedra);
 }
