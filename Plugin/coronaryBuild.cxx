@@ -224,6 +224,7 @@ void coronaryBuild::Next()
   {
     this->Bar->setValue(BarSteps);
     this->End("Finished: press play.");
+    this->hide(); // the model is behind it
     return;
   }
   const QJsonObject step = this->Steps[this->Step].toObject();

@@ -1,12 +1,16 @@
 """Runs inside the ParaView window, called by the play-back of scripts/render-paraview.sh: keeps pictures of the window."""
 import os
 import struct
+import sys
 
 import numpy
 from paraview import simple
 from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkIOImage import vtkPNGWriter
+
+sys.path.insert(0, os.environ["TESTING"])
+from window_testing import live
 
 # Steps of grey values, a divisor of 255: the noise of a CT makes large files.
 LEVEL = 15
@@ -42,3 +46,10 @@ def open_series():
     if os.environ.get("SERIES"):
         source = simple.OpenDataFile(os.environ["SERIES"])
         simple.SetActiveSource(source)
+
+
+def wait():
+    """Until the model is built and its frames are ready."""
+    live(3600.0, lambda: simple.FindSource("Wall in the slice"))
+    live(3600.0, lambda: not any(view.UseCache for view in simple.GetRenderViews()))
+    live(2.0)

@@ -25,7 +25,9 @@ SCREEN="$work"
 # The user's settings neither change the pictures, nor are changed.
 HOME="$work/home"
 XDG_CONFIG_HOME="$work/home"
-export PICTURES SERIES SCREEN HOME XDG_CONFIG_HOME
+TESTING="$root/Testing/ParaView"
+DYNAMICCORONARY_TEST_FOLDER="$work"
+export PICTURES SERIES SCREEN HOME XDG_CONFIG_HOME TESTING DYNAMICCORONARY_TEST_FOLDER
 mkdir -p "$HOME"
 
 shell='pqClientMainWindow/pythonShellDock/pythonShell/consoleWidget'
@@ -47,6 +49,8 @@ click() {
   done
   python "open_series()"
   click coronaryBuild
+  echo '<pqevent object="pqClientMainWindow/coronaryBuildWindow/start" command="activate" arguments="" />'
+  python "wait()"
   python "grab('build')"
   echo '</pqevents>'
 } >"$work/play.xml"

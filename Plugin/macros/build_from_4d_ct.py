@@ -24,14 +24,14 @@ LEAST_PHASES, SAME_PHASE = 4, 0.02
 USUAL_PHASE = 0.75
 
 
-def build(source, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), largest_radius=4.5, window=(),
+def build(source=None, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), largest_radius=4.5, window=(),
           beyond_mask=False, least_branch=0.0, centerline_steps=5000000, labels=True,
           edges=(0.15, 0.7), open_ends=False, leave_bones_outside=False, temporal_window_ms=66.0,
           tracked="all", interpolation="cubic", limits=True, motion="automatic", heart_rate=0.0, motion_amplitude=1.0,
           show=True, size=None):
     """Assembles the pipeline and computes it.
 
-    source        image series, or the output port of one; of fewer than four phases the motion of a population, bent to them
+    source        image series, or the output port of one; None: the selected one. Of fewer than four phases the motion of a population, bent to them
     time          reference phase as a fraction of the R-R interval; None: the quietest one
     scales, c     vesselness: least and greatest scale in mm, and Frangi's c; c 0: from the image
     seed          x, y, z of each seed one after the other, mm, LPS; none: the ostia are looked for
@@ -44,6 +44,7 @@ def build(source, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), largest_rad
     RuntimeError with one sentence when a stage finds nothing; the stages before it stay.
     """
     views.require_plugin()
+    source = selected_series() if source is None else source
     if motion not in MOTIONS:
         raise RuntimeError("motion is %r; it has to be one of %s." % (motion, ", ".join(MOTIONS)))
     times = views.times_of(source)
@@ -178,7 +179,7 @@ def greatest_displacement(lines, times):
     def at(time):
         lines.UpdatePipeline(time)
         return lines.PointData["Displacement"].GetRange(-1)[1]
-    return max(at(time) for time in times)
+    return max(at(time) for time in reversed(times))  # the first last: what is looked at next is of that
 
 
 def show_model(made, times, size=None):
@@ -288,7 +289,7 @@ def selected_series():
 def main():
     """As a macro: one message instead of a Python traceback."""
     try:
-        build(selected_series())
+        build()
     except RuntimeError as error:
         print_error("Dynamic Coronary: %s" % error)
 

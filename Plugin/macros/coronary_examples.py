@@ -39,7 +39,7 @@ def phantom(size=None):
     layout, front = views.new_layout("Phantom", size)
     axial, _ = views.split(layout, 0, 0.55)
     source = simple.CoronaryPhantom(registrationName="Coronary Phantom", Seed=1, Spacing=[0.8, 0.8, 0.8],
-                                    SurfaceSpacing=0.6)
+                                    SurfaceSpacing=0.8)
     steps = views.ready_to_play()
     source.UpdatePipeline(*steps[:1])
     box = list(source.GetDataInformation(SURFACE).GetBounds())

@@ -16,6 +16,7 @@ PHASE = "{time:.0f} % of the R-R interval"
 RADIUS = "MaximumInscribedSphereRadius"
 # Of the names beside a tree: points of the font, and pixels a letter and a line of it take.
 NAME_SIZE, LETTER, LINE_HEIGHT = 15, 10.0, 18.0
+SMALL_VIEW = 300  # height of the view of the names in a window of usual size, pixels
 # One vertex a name. A filter, so that the names move with the tree, and are in a state.
 NAMES = """
 from vtkmodules.vtkCommonCore import vtkPoints, vtkStringArray
@@ -368,7 +369,8 @@ def name_segments(source, shown, view):
     transfer.IndexedColors = [part for n in range(len(segments)) for part in SEGMENTS[n % len(SEGMENTS)]]
     transfer.IndexedOpacities = [1.0] * len(segments)
     shown.SetScalarBarVisibility(view, False)
-    places = name_places(lines, 2.0 * view.CameraParallelScale / max(view.ViewSize[1], 1))
+    # The window gives a view its size later; in a larger one names are farther apart.
+    places = name_places(lines, 2.0 * view.CameraParallelScale / max(1, min(view.ViewSize[1], SMALL_VIEW)))
     names = simple.ProgrammableFilter(source, registrationName="Names", OutputDataSetType="vtkPolyData",
                                       Script=NAMES % places)
     written = simple.Show(names, view, "GeometryRepresentation")

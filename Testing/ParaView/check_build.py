@@ -67,6 +67,21 @@ def require_shown(made):
         require_picture(picture, 0.02)
 
 
+def require_names_apart(made):
+    """Of the main vessels, from the front, in a view of 300 pixels: at the first time step."""
+    view = made["views"][2]
+    names = fetch(made["names"], 0, simple.GetAnimationScene().TimeKeeper.TimestepValues[0])
+    millimetres = 2.0 * view.CameraParallelScale / 300.0
+    labels = names.GetPointData().GetAbstractArray("SegmentLabel")
+    places = {labels.GetValue(n): names.GetPoint(n) for n in range(names.GetNumberOfPoints())}
+    require(len(places) == names.GetNumberOfPoints() and {"pLAD", "pLCx"} <= set(places), "the names are %s" % sorted(places))
+    main = [name for name in places if name[1:] in ("LAD", "LCx", "RCA")]
+    for n, one in enumerate(main):
+        for other in main[:n]:
+            across, _, up = (abs(a - b) / millimetres for a, b in zip(places[one], places[other]))
+            require(across > 36.0 or up > 14.0, "%s lies on %s: %.0f and %.0f pixels" % (one, other, across, up))
+
+
 def fails(work, words):
     try:
         work()
@@ -90,6 +105,7 @@ require(macro.selected_series() == source, "the only series is not taken")
 made = macro.build(source, seed=SEED, least_branch=LEAST_BRANCH, edges=EDGES, motion="tracked", size=(1000, 600))
 require_the_run(made, result)
 require_shown(made)
+require_names_apart(made)
 require_named()
 fails(lambda: macro.require_vessels(made["tree"], 0.1), "more than twice the largest one")
 fails(lambda: macro.build(source, motion="some"), "motion is 'some'")
