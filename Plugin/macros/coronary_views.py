@@ -17,20 +17,6 @@ RADIUS = "MaximumInscribedSphereRadius"
 # Of the names beside a tree: points of the font, and pixels a letter and a line of it take.
 NAME_SIZE, LETTER, LINE_HEIGHT = 15, 10.0, 18.0
 SMALL_VIEW = 300  # height of the view of the names in a window of usual size, pixels
-# One vertex a name. A filter, so that the names move with the tree, and are in a state.
-NAMES = """
-from vtkmodules.vtkCommonCore import vtkPoints, vtkStringArray
-lines, names = self.GetPolyDataInput(), self.GetPolyDataOutput()
-points, labels = vtkPoints(), vtkStringArray()
-labels.SetName("SegmentLabel")
-names.AllocateEstimate(1, 1)
-for number, label in %r:
-    if number < lines.GetNumberOfPoints():
-        names.InsertNextCell(1, 1, [points.InsertNextPoint(lines.GetPoint(number))])
-        labels.InsertNextValue(label)
-names.SetPoints(points)
-names.GetPointData().AddArray(labels)
-"""
 
 
 def require_plugin():
@@ -324,31 +310,25 @@ def grey_window(source, array, usual):
 
 
 def name_places(lines, millimetres):
-    """A point of each name's lines at which it is written: near their middle, where no other name is, from the front.
+    """Of each name the line at whose middle it is written, where no other name is, from the front; names without one are left out.
 
-    `millimetres` a pixel. Returns numbers of points and names.
+    `millimetres` a pixel. Returns by name the number of the line, and the place.
     """
     labels = lines.GetCellData().GetAbstractArray("SegmentLabel")
-    numbers = {}
+    middles = {}
     for cell in range(lines.GetNumberOfCells()):
-        name = labels.GetValue(cell)
-        if name:
-            ids = lines.GetCell(cell).GetPointIds()
-            numbers.setdefault(name, []).extend(ids.GetId(n) for n in range(ids.GetNumberOfIds()))
-    places, boxes = [], []
-    for name, points in sorted(numbers.items(), key=lambda item: len(item[1])):
-        wide, high = LETTER * len(name) * millimetres, LINE_HEIGHT * millimetres
-
-        def cost(number, count=len(points)):
-            x, _, z = lines.GetPoint(points[number])
-            covered = sum(max(0.0, 0.5 * (wide + across) - abs(x - middle)) * max(0.0, high - abs(z - height))
-                          for middle, height, across in boxes) / (wide * high)
-            return covered + 0.01 * abs(number / count - 0.5)
-
-        best = points[min(range(0, len(points), max(1, len(points) // 50)), key=cost)]
-        x, _, z = lines.GetPoint(best)
-        boxes.append((x, z, wide))
-        places.append((best, name))
+        points = lines.GetCell(cell).GetPoints()
+        middles.setdefault(labels.GetValue(cell), []).append((cell, points.GetPoint(points.GetNumberOfPoints() // 2)))
+    places = {}
+    high = LINE_HEIGHT * millimetres
+    # The trunks first: their ends p, m and d come before the branches of the same length.
+    for name in sorted(filter(None, middles), key=lambda name: (name[0] not in "pmdL", name)):
+        for cell, place in middles[name]:
+            free = all(abs(place[0] - other[0]) > 0.5 * LETTER * (len(name) + len(known)) * millimetres
+                       or abs(place[2] - other[2]) > high for known, (_, other) in places.items())
+            if free:
+                places[name] = cell, place
+                break
     return places
 
 
@@ -356,7 +336,7 @@ def name_segments(source, shown, view):
     """Colours of a named tree's lines by their SCCT segments, and the names beside them.
 
     `shown` is the representation of `source` in `view`, which looks from the front already. The names are labels of a
-    selection, of the source that is returned: another selection takes their place.
+    selection: another selection takes their place. Returns them as name_places().
     """
     lines = fetched(source)
     ids = lines.GetCellData().GetArray("SegmentIds")
@@ -371,17 +351,14 @@ def name_segments(source, shown, view):
     shown.SetScalarBarVisibility(view, False)
     # The window gives a view its size later; in a larger one names are farther apart.
     places = name_places(lines, 2.0 * view.CameraParallelScale / max(1, min(view.ViewSize[1], SMALL_VIEW)))
-    names = simple.ProgrammableFilter(source, registrationName="Names", OutputDataSetType="vtkPolyData",
-                                      Script=NAMES % places)
-    written = simple.Show(names, view, "GeometryRepresentation")
-    plain(written, BLACK)
     active = simple.GetActiveSource()
-    simple.SetActiveSource(names)
-    simple.QuerySelect(QueryString="(id >= 0)", FieldType="POINT")
+    simple.SetActiveSource(source)
+    simple.QuerySelect(QueryString=" | ".join("(id == %d)" % cell for cell, _ in places.values()) or "(id < 0)",
+                       FieldType="CELL")
     simple.SetActiveSource(active)
-    written.SelectionOpacity = 0.0
-    written.SelectionPointLabelVisibility = 1
-    written.SelectionPointFieldDataArrayName = "SegmentLabel"
-    written.SelectionPointLabelColor = BLACK
-    written.SelectionPointLabelFontSize = NAME_SIZE
-    return names
+    shown.SelectionOpacity = 0.0
+    shown.SelectionCellLabelVisibility = 1
+    shown.SelectionCellFieldDataArrayName = "SegmentLabel"
+    shown.SelectionCellLabelColor = BLACK
+    shown.SelectionCellLabelFontSize = NAME_SIZE
+    return places

@@ -70,11 +70,9 @@ def require_shown(made):
 def require_names_apart(made):
     """Of the main vessels, from the front, in a view of 300 pixels: at the first time step."""
     view = made["views"][2]
-    names = fetch(made["names"], 0, simple.GetAnimationScene().TimeKeeper.TimestepValues[0])
     millimetres = 2.0 * view.CameraParallelScale / 300.0
-    labels = names.GetPointData().GetAbstractArray("SegmentLabel")
-    places = {labels.GetValue(n): names.GetPoint(n) for n in range(names.GetNumberOfPoints())}
-    require(len(places) == names.GetNumberOfPoints() and {"pLAD", "pLCx"} <= set(places), "the names are %s" % sorted(places))
+    places = {name: place for name, (_, place) in made["names"].items()}
+    require({"LAD", "LCx"} <= {name[1:] for name in places}, "the names are %s" % sorted(places))
     main = [name for name in places if name[1:] in ("LAD", "LCx", "RCA")]
     for n, one in enumerate(main):
         for other in main[:n]:

@@ -71,7 +71,7 @@ def look(step):
     elif step == "built":
         live(300.0, lambda: simple.FindSource("Wall in the slice"))
         live(600.0, lambda: not list(filter(None, [view.UseCache for view in simple.GetRenderViews()])))
-        for name in ("Named trees", "Surface", "Beating surface", "Moving mesh", "Wall", "Names"):
+        for name in ("Named trees", "Surface", "Beating surface", "Moving mesh", "Wall"):
             require(simple.FindSource(name), "there is no %s" % name)
         require(len([name for name, _ in simple.GetSources() if name == "Named trees"]) == 1, "trees twice")
         require(simple.GetAnimationScene().Loop == 1, "no loop")
