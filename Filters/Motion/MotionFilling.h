@@ -2,7 +2,8 @@
  * @file MotionFilling.h
  * @brief Where the nodes of a tree are that were not seen: from their own way before and after, and from the heart around them.
  *
- * What a node was not seen doing is predicted from the phases at which it was. How wrong the same prediction is for the
+ * What a node was not seen doing is predicted from the phases at which it was, with weights that the times suggest and
+ * what was seen of the whole heart at the phase corrects. How wrong the same prediction is for the
  * nodes that were seen at the phase is a smooth field over the heart (Gaussian process: affine and a squared
  * exponential of the distance at rest; Rasmussen & Williams 2006), and is added to it. Nodes on all vessels
  * around count, not only those of the same branch.
@@ -32,10 +33,12 @@ Trajectories FitRobustly(const LineNodes& nodes, const std::vector<double>& time
   const TrajectoryPrior& prior);
 
 /**
- * Places of the nodes that were not seen, with information by their uncertainty; of the others none. A phase at which
- * fewer than 8 nodes were seen tells nothing, and there is none of it at all.
+ * Places of the nodes that were not seen, with information by their uncertainty; of the others none. At a phase at
+ * which no node was seen, what was measured there all the same stands for it, as far as it agrees with a motion of the
+ * whole heart. Where fewer than 8 nodes are known of a phase, there is no information.
  * @param displacement  per phase and node, mm; of nodes that were not seen a guess
  * @param seen          per phase and node
+ * @param measurements  of all nodes; may be none
  */
 MotionMeasurements FillUnseen(const LineNodes& nodes, const std::vector<double>& times,
   double referenceTime, const std::vector<std::vector<Vector3>>& displacement,
@@ -44,7 +47,7 @@ MotionMeasurements FillUnseen(const LineNodes& nodes, const std::vector<double>&
 
 /**
  * FitRobustly with what FillUnseen says. What was measured where nothing was seen may be of the wrong tissue, all of a
- * branch alike: it counts as far as it agrees with that. At a phase where nothing at all was seen it is all that there is.
+ * branch alike: it counts as far as it agrees with that.
  * @param seen  as of FillUnseen
  */
 Trajectories FitFilled(const LineNodes& nodes, const std::vector<double>& times,
