@@ -70,6 +70,27 @@ void TraceWidget::Add(const SessionSnapshot& snapshot)
   this->update();
 }
 
+QString TraceWidget::PressureText() const
+{
+  const double now = this->Samples.back().pressure;
+  double highest = now;
+  double lowest = now;
+  const double from =
+    this->Samples.back().seconds - (this->HeartRate > 0.0 ? 60.0 / this->HeartRate : 0.0);
+  for (const Sample& sample : this->Samples)
+  {
+    if (sample.seconds >= from)
+    {
+      highest = std::max(highest, sample.pressure);
+      lowest = std::min(lowest, sample.pressure);
+    }
+  }
+  // Before the first beat is over, and while the heart stands, there are no two pressures.
+  const bool isBeat = this->HeartRate > 0.0 && this->Samples.front().seconds <= from;
+  return (isBeat ? QString("%1/%2 mmHg").arg(highest, 0, 'f', 0).arg(lowest, 0, 'f', 0)
+                 : QString("%1 mmHg").arg(now, 0, 'f', 0));
+}
+
 void TraceWidget::paintEvent(QPaintEvent*)
 {
   QPainter painter(this);
@@ -88,8 +109,7 @@ void TraceWidget::paintEvent(QPaintEvent*)
   painter.setPen(QColor(240, 90, 80));
   if (!this->Samples.empty())
   {
-    painter.drawText(writing, Qt::AlignRight | Qt::AlignBottom,
-      QString("%1 mmHg").arg(this->Samples.back().pressure, 0, 'f', 0));
+    painter.drawText(writing, Qt::AlignRight | Qt::AlignBottom, this->PressureText());
   }
   if (this->Samples.size() < 2)
   {
@@ -97,7 +117,7 @@ void TraceWidget::paintEvent(QPaintEvent*)
   }
   painter.setRenderHint(QPainter::Antialiasing);
   const double end = this->Samples.back().seconds;
-  const double width = this->width() - 150.0;
+  const double width = this->width() - 220.0;
   const double half = 0.5 * this->height();
   QPolygonF lead;
   QPolygonF pressure;

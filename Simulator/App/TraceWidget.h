@@ -26,6 +26,9 @@ protected:
   void paintEvent(QPaintEvent* event) override;
 
 private:
+  /// Systolic over diastolic pressure of the last beat, as 120/80.
+  QString PressureText() const;
+
   struct Sample
   {
     double seconds;

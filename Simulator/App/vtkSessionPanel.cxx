@@ -9,6 +9,7 @@
 #include <QGridLayout>
 #include <QGroupBox>
 #include <QMessageBox>
+#include <QRegularExpression>
 #include <QScrollArea>
 #include <QToolBar>
 #include <QVBoxLayout>
@@ -46,6 +47,59 @@ QDoubleSpinBox* Number(
   box->setFocusPolicy(Qt::ClickFocus);
   return box;
 }
+
+/// An angle of the C-arm, which is named by its side and has no sign: "RAO 25". A number alone, with a sign, can be typed.
+class AngleBox : public QDoubleSpinBox
+{
+public:
+  AngleBox(double most, const QString& positive, const QString& negative)
+    : Positive(positive)
+    , Negative(negative)
+  {
+    this->setRange(-most, most);
+    this->setSingleStep(5.0);
+    this->setDecimals(0);
+    this->setToolTip(positive + " or " + negative);
+    this->setKeyboardTracking(false);
+    this->setFocusPolicy(Qt::ClickFocus);
+  }
+
+  QString textFromValue(double value) const override
+  {
+    const double whole = std::round(value);
+    const QString side = whole > 0.0 ? this->Positive + " "
+      : whole < 0.0                  ? this->Negative + " "
+                                     : "";
+    return side + QString::number(std::abs(whole), 'f', 0) + QChar(0x00B0);
+  }
+
+  double valueFromText(const QString& text) const override
+  {
+    const QRegularExpressionMatch match = this->Pattern().match(text);
+    const bool isNegative = match.captured(1).compare(this->Negative, Qt::CaseInsensitive) == 0;
+    return (isNegative ? -1.0 : 1.0) * match.captured(2).toDouble();
+  }
+
+  QValidator::State validate(QString& text, int&) const override
+  {
+    const QRegularExpressionMatch match = this->Pattern().match(text);
+    return match.hasMatch() && !match.captured(2).isEmpty() &&
+        std::abs(this->valueFromText(text)) <= this->maximum()
+      ? QValidator::Acceptable
+      : QValidator::Intermediate;
+  }
+
+private:
+  QRegularExpression Pattern() const
+  {
+    return QRegularExpression(
+      "^\\s*(" + this->Positive + "|" + this->Negative + ")?\\s*(-?\\d*)\\s*\u00B0?\\s*$",
+      QRegularExpression::CaseInsensitiveOption);
+  }
+
+  QString Positive;
+  QString Negative;
+};
 
 QPushButton* Button(const QString& text, const QString& help)
 {
@@ -130,9 +184,8 @@ QGroupBox* SessionWindow::MakeViewGroup()
     this->ViewChoice->addItem(view.name);
   }
   this->ViewChoice->setFocusPolicy(Qt::NoFocus);
-  this->PrimaryBox = Number(-105.0, 105.0, 5.0, 0, QChar(0x00B0), "LAO positive, RAO negative");
-  this->SecondaryBox =
-    Number(-50.0, 50.0, 5.0, 0, QChar(0x00B0), "Cranial positive, caudal negative");
+  this->PrimaryBox = new AngleBox(105.0, "LAO", "RAO");
+  this->SecondaryBox = new AngleBox(50.0, "CRA", "CAU");
   this->DistanceBox = Number(900.0, 1300.0, 10.0, 0, "mm", "Source to detector");
   form->addRow(this->ViewChoice);
   form->addRow("LAO / RAO", this->PrimaryBox);

@@ -30,6 +30,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <stdexcept>
 #include <utility>
@@ -97,6 +98,22 @@ std::string KeyName(const QKeyEvent& event)
   }
   return {};
 }
+
+/// Without a minus before what is rounded to nothing.
+QString Decimal(double value, int digits)
+{
+  const double unit = std::pow(10.0, digits);
+  return QString::number(std::round(value * unit) / unit + 0.0, 'f', digits);
+}
+
+/// Whose arteries they are, as far as the folder tells.
+std::string NameOf(const Scenario& scenario)
+{
+  const std::string name = std::filesystem::path(scenario.vessels.path).filename().string();
+  return scenario.vessels.kind == VesselSource::Kind::Run && !name.empty()
+    ? name + " - " + scenario.name
+    : scenario.name;
+}
 }
 
 SessionWindow::SessionWindow(const SessionWorld& world, const WindowOptions& options)
@@ -106,7 +123,7 @@ SessionWindow::SessionWindow(const SessionWorld& world, const WindowOptions& opt
   // For as long as the window is open: nobody should take this motion for the patient's.
   const std::string foreign = world.foreignMotion.empty() ? "" : " - " + world.foreignMotion;
   this->setWindowTitle(
-    "DynamicCoronary simulator - " + QString::fromStdString(world.scenario.name + foreign));
+    "DynamicCoronary simulator - " + QString::fromStdString(NameOf(world.scenario) + foreign));
   this->resize(options.width, options.height);
   std::shared_ptr<const HeartShell> heart;
   if (options.heart)
@@ -481,12 +498,9 @@ void SessionWindow::ShowNumbers(const SessionSnapshot& now)
   this->InstrumentText->setText(
     QString("Beyond the catheter  %1 mm, in %2\nCatheter beyond ostium  %3 mm\n"
             "Hand  %4 N, %5 N mm    Tip  %6 N")
-      .arg(report.inserted, 0, 'f', 1)
-      .arg(nameOf(report.branch))
-      .arg(report.catheterTip, 0, 'f', 1)
-      .arg(report.proximalForce, 0, 'f', 2)
-      .arg(report.proximalTorque, 0, 'f', 2)
-      .arg(report.tipForce, 0, 'f', 2));
+      .arg(Decimal(report.inserted, 1), nameOf(report.branch), Decimal(report.catheterTip, 1),
+        Decimal(report.proximalForce, 2), Decimal(report.proximalTorque, 2),
+        Decimal(report.tipForce, 2)));
   this->ContrastText->setText(
     QString("%1 mL injected, %2 mL in the arteries,\n%3 mL in the myocardium, %4 mL spilled")
       .arg(now.contrast.injected, 0, 'f', 1)

@@ -131,7 +131,7 @@ const std::vector<KeyBinding>& KeyboardDevice::KeyMap()
     { "I, K", "C-arm to cranial, caudal" }, { "O, U", "detector away from the patient, nearer" },
     { "T, G", "isocentre towards the head, the feet" },
     { "H, Z", "isocentre towards the patient's left, right" },
-    { "Prior, Next", "isocentre towards the front, the back" } };
+    { "Page Up, Page Down", "isocentre towards the front, the back" } };
   return map;
 }
 
