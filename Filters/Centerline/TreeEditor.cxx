@@ -4,6 +4,7 @@
 #include "CoronaryAnatomy.h"
 #include "CurveSmoothing.h"
 #include "LumenRefinement.h"
+#include "PlaceText.h"
 #include "TreeLinks.h"
 #include "VesselPaths.h"
 
@@ -45,13 +46,6 @@ void Complete(std::vector<Value>& values, std::size_t count, Value usual)
     values.assign(count, usual);
   }
 }
-}
-
-std::string PlaceText(const Vector3& place)
-{
-  char text[100];
-  std::snprintf(text, sizeof(text), "(%.1f, %.1f, %.1f)", place[0], place[1], place[2]);
-  return text;
 }
 
 int SegmentOf(const std::string& name)

@@ -15,9 +15,6 @@
 
 namespace coronary
 {
-/// "(1.0, 2.0, 3.0)"
-std::string PlaceText(const Vector3& place);
-
 /// The segment id of an SCCT name; 0: there is none.
 int SegmentOf(const std::string& name);
 

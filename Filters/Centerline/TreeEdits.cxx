@@ -3,6 +3,7 @@
 #include "CoronaryAnatomy.h"
 #include "CurveSmoothing.h"
 #include "GridIndex.h"
+#include "PlaceText.h"
 #include "Require.h"
 #include "TreeEditor.h"
 

@@ -91,6 +91,8 @@ private:
   bool Fill(std::size_t node, const Prediction& prediction, const Sightings& sightings,
     Vector3& place, double& deviation) const;
   double Covariance(double a, double b) const;
+  /// Whether any node was seen at a phase.
+  bool IsSighted(std::size_t phase) const;
   /// The phases at which a node was seen.
   std::vector<std::size_t> SeenPhases(std::size_t node) const;
   Prediction PredictionFrom(std::vector<std::size_t> phases, std::size_t phase) const;
@@ -119,6 +121,12 @@ double Filler::Covariance(double a, double b) const
     sum += sd * sd * std::cos(Turn * m * (a - b));
   }
   return sum;
+}
+
+bool Filler::IsSighted(std::size_t phase) const
+{
+  return std::any_of(
+    this->Seen[phase].begin(), this->Seen[phase].end(), [](bool own) { return own; });
 }
 
 std::vector<std::size_t> Filler::SeenPhases(std::size_t node) const
@@ -191,18 +199,20 @@ double Filler::VarianceOf(
 Sightings Filler::SightingsAt(
   std::size_t phase, const std::vector<const MotionMeasurements*>& measurements) const
 {
+  if (!this->IsSighted(phase))
+  {
+    return this->MeasuredAt(phase, measurements);
+  }
   Sightings result;
   result.nodes.resize(this->Nodes.size());
-  bool any = false;
   for (std::size_t n = 0; n < this->Nodes.size(); ++n)
   {
     if (this->Seen[phase][n])
     {
       result.nodes[n] = { this->Displacement[phase][n], SeenDeviation * SeenDeviation };
-      any = true;
     }
   }
-  return any ? result : this->MeasuredAt(phase, measurements);
+  return result;
 }
 
 Sightings Filler::MeasuredAt(
@@ -229,7 +239,7 @@ Sightings Filler::MeasuredAt(
   std::vector<std::size_t> phases;
   for (std::size_t k = 0; k < this->Times.size(); ++k)
   {
-    if (std::any_of(this->Seen[k].begin(), this->Seen[k].end(), [](bool own) { return own; }))
+    if (this->IsSighted(k))
     {
       phases.push_back(k);
     }
@@ -463,13 +473,7 @@ Trajectories FitFilled(const LineNodes& nodes, const std::vector<double>& times,
   const std::vector<const MotionMeasurements*>& measurements, const TrajectoryPrior& prior)
 {
   const std::size_t phases = times.size();
-  // A phase at which nothing was seen has nothing but what was measured at first.
-  std::vector<bool> blind(phases);
-  for (std::size_t k = 0; k < phases; ++k)
-  {
-    blind[k] = std::none_of(seen[k].begin(), seen[k].end(), [](bool own) { return own; });
-  }
-  const auto weighed = [&](bool withBlind, const auto& weight)
+  const auto weighed = [&](const auto& weight)
   {
     std::vector<MotionMeasurements> result;
     for (const MotionMeasurements* one : measurements)
@@ -477,7 +481,7 @@ Trajectories FitFilled(const LineNodes& nodes, const std::vector<double>& times,
       result.push_back(*one);
       for (std::size_t k = 0; k < phases; ++k)
       {
-        for (std::size_t n = 0; (withBlind || !blind[k]) && n < nodes.size(); ++n)
+        for (std::size_t n = 0; n < nodes.size(); ++n)
         {
           if (!seen[k][n])
           {
@@ -499,7 +503,7 @@ Trajectories FitFilled(const LineNodes& nodes, const std::vector<double>& times,
     return FitRobustly(nodes, times, referenceTime, all, prior);
   };
   const Trajectories known =
-    fit(weighed(true, [](const MotionMeasurements&, std::size_t, std::size_t) { return 0.0; }));
+    fit(weighed([](const MotionMeasurements&, std::size_t, std::size_t) { return 0.0; }));
   std::vector<std::vector<Vector3>> displacement(phases, std::vector<Vector3>(nodes.size()));
   for (std::size_t k = 0; k < phases; ++k)
   {
@@ -522,7 +526,7 @@ Trajectories FitFilled(const LineNodes& nodes, const std::vector<double>& times,
     const double apart = (filled.displacement[k][n] - one.displacement[k][n]).squaredNorm();
     return std::exp(-apart / (one.robustScale * one.robustScale + 9.0 / information));
   };
-  std::vector<MotionMeasurements> all = weighed(true, agreement);
+  std::vector<MotionMeasurements> all = weighed(agreement);
   // Neighbours are filled from the same, and wrong together: what they say is not said by each anew.
   for (std::vector<Matrix3>& phase : filled.information)
   {

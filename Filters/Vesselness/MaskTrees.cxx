@@ -2,6 +2,7 @@
 
 #include "DistanceTransform.h"
 #include "GridIndex.h"
+#include "PlaceText.h"
 #include "VoxelLattice.h"
 
 #include <algorithm>
@@ -34,13 +35,6 @@ struct Piece
   double diagonal = 0.0;
   double reach = 0.0; ///< mm away from the aorta
 };
-
-std::string At(const Vector3& place)
-{
-  char text[100];
-  std::snprintf(text, sizeof(text), "(%.1f, %.1f, %.1f)", place[0], place[1], place[2]);
-  return text;
-}
 
 class Finder
 {
@@ -276,8 +270,8 @@ MaskTrees Finder::Run(double maximumRadius, const ProgressCallback& progress)
         {
           char text[100];
           std::snprintf(text, sizeof(text), "a piece of %.0f mm^3 around ", volume);
-          this->Result.remarks.push_back(
-            text + At(place(piece.voxels)) + " is left out: it hangs on no tree of the mask");
+          this->Result.remarks.push_back(text + PlaceText(place(piece.voxels)) +
+            " is left out: it hangs on no tree of the mask");
           leftOut = 0.0;
         }
       }

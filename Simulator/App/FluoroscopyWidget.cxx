@@ -21,15 +21,20 @@ QString TimeText(double seconds)
 }
 }
 
+QString SideText(double degrees, const QString& positive, const QString& negative)
+{
+  const int whole = static_cast<int>(std::lround(degrees));
+  const QString size = QString::number(std::abs(whole));
+  return whole == 0 ? size : (whole > 0 ? positive : negative) + " " + size;
+}
+
 QString ViewText(double primary, double secondary)
 {
-  const int lao = static_cast<int>(std::lround(primary / Degree));
-  const int cranial = static_cast<int>(std::lround(secondary / Degree));
-  const QString first =
-    lao == 0 ? QString("AP") : QString("%1 %2").arg(lao > 0 ? "LAO" : "RAO").arg(std::abs(lao));
-  return cranial == 0
+  const bool straight = std::lround(primary / Degree) == 0;
+  const QString first = straight ? QString("AP") : SideText(primary / Degree, "LAO", "RAO");
+  return std::lround(secondary / Degree) == 0
     ? first
-    : QString("%1  %2 %3").arg(first).arg(cranial > 0 ? "CRA" : "CAU").arg(std::abs(cranial));
+    : first + "  " + SideText(secondary / Degree, "CRA", "CAU");
 }
 
 FluoroscopyWidget::FluoroscopyWidget(QWidget* parent)

@@ -66,11 +66,7 @@ public:
 
   QString textFromValue(double value) const override
   {
-    const double whole = std::round(value);
-    const QString side = whole > 0.0 ? this->Positive + " "
-      : whole < 0.0                  ? this->Negative + " "
-                                     : "";
-    return side + QString::number(std::abs(whole), 'f', 0) + QChar(0x00B0);
+    return SideText(value, this->Positive, this->Negative) + QChar(0x00B0);
   }
 
   double valueFromText(const QString& text) const override

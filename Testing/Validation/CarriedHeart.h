@@ -90,20 +90,36 @@ struct Shell
     return { from, from + static_cast<std::ptrdiff_t>(this->count) };
   }
 
-  VesselImage Filled(const std::vector<Vector3>& points, double spacing) const
+  /// With the valves' planes, which are fans about the points that AddMiddles() adds.
+  std::vector<Triangle> Closed() const
   {
-    std::vector<Vector3> corners = this->Own(points);
     std::vector<Triangle> closed = this->triangles;
+    auto middle = static_cast<std::int64_t>(this->count);
     for (const std::vector<std::int64_t>& loop : this->valves)
     {
-      const auto middle = static_cast<std::int64_t>(corners.size());
-      corners.push_back(MeanOf(corners, loop));
       for (std::size_t n = 0; n < loop.size(); ++n)
       {
         closed.push_back({ loop[(n + 1) % loop.size()], loop[n], middle });
       }
+      ++middle;
     }
-    return RenderSurface(corners, closed, spacing, 2.0 * spacing);
+    return closed;
+  }
+
+  /// @param corners  as of Own(); gets the middle of each valve
+  void AddMiddles(std::vector<Vector3>& corners) const
+  {
+    for (const std::vector<std::int64_t>& loop : this->valves)
+    {
+      corners.push_back(MeanOf(corners, loop));
+    }
+  }
+
+  VesselImage Filled(const std::vector<Vector3>& points, double spacing) const
+  {
+    std::vector<Vector3> corners = this->Own(points);
+    this->AddMiddles(corners);
+    return RenderSurface(corners, this->Closed(), spacing, 2.0 * spacing);
   }
 };
 

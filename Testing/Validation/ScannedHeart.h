@@ -121,17 +121,8 @@ inline MeshAnatomy AnatomyOf(
     AnatomyPart part;
     part.name = name;
     part.material = amounts;
-    part.triangles = shell.triangles;
+    part.triangles = shell.Closed();
     part.still = still;
-    std::int64_t middle = static_cast<std::int64_t>(shell.count);
-    for (const std::vector<std::int64_t>& loop : shell.valves)
-    {
-      for (std::size_t n = 0; n < loop.size(); ++n)
-      {
-        part.triangles.push_back({ loop[(n + 1) % loop.size()], loop[n], middle });
-      }
-      ++middle;
-    }
     for (int k = 0; k < (still ? 1 : Frames); ++k)
     {
       part.phases.push_back(phases[k]);
@@ -141,10 +132,7 @@ inline MeshAnatomy AnatomyOf(
       {
         corners[n] += outwards * normals[n];
       }
-      for (const std::vector<std::int64_t>& loop : shell.valves)
-      {
-        corners.push_back(MeanOf(corners, loop));
-      }
+      shell.AddMiddles(corners);
       part.positions.push_back(std::move(corners));
     }
     parts.push_back(std::move(part));
@@ -186,7 +174,7 @@ inline MeshAnatomy AnatomyOf(
     }
     parts.push_back(std::move(part));
   };
-  // Great cardiac vein and the small one, 3.5 mm beside the LAD and the RCA.
+  // The small cardiac vein beside the RCA, the great one beside the LAD.
   tube("vein beside the RCA", 0, 4.0, 1.3, material("blood", 0.6 * iodine));
   tube("vein beside the LAD", 2, 4.0, 1.5, material("blood", 0.6 * iodine));
   for (std::size_t vessel = 0; vessel < tree.Reference().lines.size(); ++vessel)
