@@ -21,6 +21,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <future>
 #include <memory>
 #include <sstream>
 #include <stdexcept>
@@ -304,6 +305,8 @@ private:
   void CollectBefore(std::size_t end);
   vtkMeshSequence::PhaseMesh Measure(std::size_t k, vtkPointSet* mesh) const;
   std::string WritePhase(std::size_t k);
+  void BeginToWrite(std::shared_ptr<const vtkMeshSequence::PhaseMesh> phase);
+  void WaitForFiles();
   void TakePhase(const std::string& bytes, coronary::MeshSequenceReport::Phase& entry);
   void Finish();
 
@@ -321,6 +324,8 @@ private:
   std::unique_ptr<vtkMeshSequence::Files> Files;
   std::vector<std::unique_ptr<vtkMeshSequence::Format>> Formats;
   std::size_t Collected = 0; ///< phases
+  /// The files of one phase, while the next one is moved; last, so that it ends before what it uses.
+  std::future<void> Writing;
 };
 
 vtkMeshSequenceWriter::Run::Run(vtkMeshSequenceWriter* self, vtkInformation* info)
@@ -450,7 +455,9 @@ vtkMeshSequence::PhaseMesh vtkMeshSequenceWriter::Run::Measure(
 {
   const vtkMeshSequence::Topology& topology = this->Files->topology;
   vtkMeshSequence::PhaseMesh phase;
-  phase.mesh = mesh;
+  // Its own: the input's next phase takes the place of this one.
+  phase.mesh.TakeReference(mesh->NewInstance());
+  phase.mesh->ShallowCopy(mesh);
   phase.index = k;
   phase.time = this->Times[k];
   try
@@ -468,7 +475,7 @@ vtkMeshSequence::PhaseMesh vtkMeshSequenceWriter::Run::Measure(
   return phase;
 }
 
-/// @return what was measured, and the names of the files, for all who share the phases
+/// @return what was measured, and where phases are shared the names of the files, for all who share them
 std::string vtkMeshSequenceWriter::Run::WritePhase(std::size_t k)
 {
   const auto count = static_cast<double>(this->Times.size());
@@ -476,21 +483,23 @@ std::string vtkMeshSequenceWriter::Run::WritePhase(std::size_t k)
   this->CollectBefore(k);
   vtkPointSet* mesh = this->MeshAt(k);
   this->CollectBefore(k + 1);
+  const auto phase = std::make_shared<const vtkMeshSequence::PhaseMesh>(this->Measure(k, mesh));
+  coronary::Report(this->Progress, (static_cast<double>(k) + 0.5) / count);
+  this->WaitForFiles();
   const std::size_t before = this->Folder->Added().size();
-  const vtkMeshSequence::PhaseMesh phase = this->Measure(k, mesh);
-  for (const auto& format : this->Formats)
-  {
-    coronary::Report(this->Progress, (static_cast<double>(k) + 0.5) / count);
-    format->Write(phase);
-  }
+  this->BeginToWrite(phase);
   std::vector<char> names;
-  for (std::size_t n = before; n < this->Folder->Added().size(); ++n)
+  if (this->Sharing.AtOnce() > 1)
   {
-    const std::string& name = this->Folder->Added()[n];
-    names.insert(names.end(), name.begin(), name.end());
-    names.push_back('\n');
+    this->WaitForFiles();
+    for (std::size_t n = before; n < this->Folder->Added().size(); ++n)
+    {
+      const std::string& name = this->Folder->Added()[n];
+      names.insert(names.end(), name.begin(), name.end());
+      names.push_back('\n');
+    }
   }
-  return coronary::Packed(NumbersOf(phase), names);
+  return coronary::Packed(NumbersOf(*phase), names);
 }
 
 void vtkMeshSequenceWriter::Run::TakePhase(
@@ -511,10 +520,33 @@ void vtkMeshSequenceWriter::Run::TakePhase(
   }
 }
 
+/// Beside what comes next: packing the files takes longer than moving the mesh, and one thread only.
+void vtkMeshSequenceWriter::Run::BeginToWrite(
+  std::shared_ptr<const vtkMeshSequence::PhaseMesh> phase)
+{
+  this->Writing = std::async(std::launch::async,
+    [this, phase]
+    {
+      for (const auto& format : this->Formats)
+      {
+        format->Write(*phase);
+      }
+    });
+}
+
+void vtkMeshSequenceWriter::Run::WaitForFiles()
+{
+  if (this->Writing.valid())
+  {
+    this->Writing.get();
+  }
+}
+
 /// Lists, the animation, the report; then the new files take the place of the old ones.
 void vtkMeshSequenceWriter::Run::Finish()
 {
   this->CollectBefore(this->Times.size());
+  this->WaitForFiles();
   if (this->Folder->IsOwner())
   {
     vtkMeshSequence::Files& files = *this->Files;
@@ -552,6 +584,10 @@ void vtkMeshSequenceWriter::Run::WriteAll()
   }
   catch (const std::exception& error)
   {
+    if (this->Writing.valid())
+    {
+      this->Writing.wait();
+    }
     try
     {
       this->Request.Restore(); // else the next update would begin with the time that failed

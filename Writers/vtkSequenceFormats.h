@@ -8,6 +8,9 @@
 #include "StagedFolder.h"
 #include "vtkSequenceTopology.h"
 
+#include <vtkPointSet.h>
+#include <vtkSmartPointer.h>
+
 #include <memory>
 #include <utility>
 
@@ -16,7 +19,7 @@ namespace vtkMeshSequence
 /// One phase, measured.
 struct PhaseMesh
 {
-  vtkPointSet* mesh = nullptr;
+  vtkSmartPointer<vtkPointSet> mesh;
   std::size_t index = 0;
   double time = 0.0;
   coronary::TetrahedraQuality tetrahedra;
