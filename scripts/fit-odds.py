@@ -30,6 +30,16 @@ BEFORE = {
     "tips": {},
     "placements": {},
 }
+# Where one of these signs is above the limit, no more is said than a coin's throw, whatever the weights: as BranchPlacement.cxx does.
+LIMITED = {"placements": (("unseen", "seldom"), 0.5)}
+
+
+def limited(kind, names, signs, chance):
+    if kind not in LIMITED:
+        return chance
+    doubtful, limit = LIMITED[kind]
+    over = (signs[..., [names.index(name) for name in doubtful]] > limit).any(axis=-1)
+    return np.where(over, np.minimum(chance, 0.5), chance)
 
 
 def fit(before, names, signs, truth):
@@ -48,13 +58,14 @@ def fit(before, names, signs, truth):
     return weights
 
 
-def say(weights, source, target):
+def say(kind, weights, source, target):
     """Writes a table with what the weights say in its column of probabilities."""
     with open(source, newline="", encoding="utf-8") as file:
         head, *rows = csv.reader(file)
     for row in rows:
-        odds = float(np.append(np.array(row[FIRST_SIGN:], float), 1.0) @ weights)
-        row[4] = f"{1.0 / (1.0 + np.exp(-odds)):.4f}"
+        signs = np.array(row[FIRST_SIGN:], float)
+        chance = 1.0 / (1.0 + np.exp(-float(np.append(signs, 1.0) @ weights)))
+        row[4] = f"{limited(kind, head[FIRST_SIGN:], signs, chance):.4f}"
     with open(target, "w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerows([head, *rows])
 
@@ -91,11 +102,11 @@ def main():
     print(f"{len(rows)} rows of {len(fold)} hearts, {int(truth.sum())} of them {what}")
     weights = fit(before, names, signs, truth)
     for source, target in arguments.say:
-        say(weights, source, target)
+        say(arguments.kind, weights, source, target)
     for name, weight in zip(names + ["(intercept)"], weights):
         print(f"{name:20s} {weight:6.2f}")
     used = np.array([float(row[4]) for row in rows])
-    chance = 1.0 / (1.0 + np.exp(-odds))
+    chance = limited(arguments.kind, names, signs, 1.0 / (1.0 + np.exp(-odds)))
     for how, said in (("as it was", used), ("fitted without their heart", chance)):
         missed = int((truth * (said < 0.5)).sum())
         print(f"{how}: {missed} {what} missed, {int(((1 - truth) * (said >= 0.5)).sum())} that are none")

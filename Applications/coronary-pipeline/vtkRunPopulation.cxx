@@ -127,6 +127,7 @@ PopulationPoses::PopulationPoses(
   this->Motion->SetReferenceTime(ReferenceOf(step.input));
   this->Guessed = !TellsPhase(step.input) && !std::isfinite(settings.time);
   this->Motion->SetAmplitude(settings.motionAmplitude);
+  this->Motion->SetTemporalWindow(settings.temporalWindowMs / 1000.0);
   this->Motion->SetHeartRate(std::isfinite(settings.heartRate) ? settings.heartRate : 0.0);
   if (plan.hasPhases)
   {

@@ -1,23 +1,26 @@
 #include "BranchPlacement.h"
 
+#include "CyclicTime.h"
 #include "Require.h"
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace coronary
 {
 namespace
 {
-constexpr double Stretch = 5.0; ///< mm: shorter ones change their length by noise alone
-
 // scripts/validate-placement.py --fit, with the scans of scripts/validate-scanned.py.
-constexpr double Intercept = 4.77;
-constexpr std::array<double, PlacementSigns::Count> Weights = { -3.48, -1.96, -0.36, -2.82, -1.60 };
+constexpr double Intercept = 6.02;
+constexpr std::array<double, PlacementSigns::Count> Weights = { -2.40, -1.72, -5.42, -1.29 };
 
 /// More is less likely than a coin's throw, whatever else speaks for it.
 constexpr double MaximumUnseen = 0.5;
 constexpr double UnseenConfidence = 0.5;
+
+/// Nearer in time than this, modulo the cycle, two phases show the same moment.
+constexpr double SameMoment = 0.02;
 
 /// Mean of what is known of a line's points; nothing: 1.
 double MeanOf(const std::vector<double>& values, const std::vector<std::int64_t>& line)
@@ -30,70 +33,76 @@ double MeanOf(const std::vector<double>& values, const std::vector<std::int64_t>
   return sum / static_cast<double>(line.size());
 }
 
-double LengthChange(const std::vector<std::int64_t>& line, const std::vector<Vector3>& rest,
-  const std::vector<Vector3>& moved)
+double UnseenShare(const std::vector<TrackingStatus>& status, const std::vector<std::int64_t>& line)
 {
-  double sum = 0.0;
-  double weight = 0.0;
-  double before = 0.0;
-  double after = 0.0;
-  for (std::size_t i = 1; i < line.size(); ++i)
+  return static_cast<double>(std::count_if(
+           line.begin(), line.end(), [&](std::int64_t p) { return IsUnseen(status[p]); })) /
+    static_cast<double>(line.size());
+}
+
+/// Greatest mean distance of a line's places at two phases, mm.
+double Range(const std::vector<std::int64_t>& line, const PoseSequence& poses)
+{
+  double range = 0.0;
+  for (std::size_t a = 0; a < poses.points.size(); ++a)
   {
-    before += (rest[line[i]] - rest[line[i - 1]]).norm();
-    after += (moved[line[i]] - moved[line[i - 1]]).norm();
-    // What is left at the end is part of no stretch, unless it is all there is.
-    if (before >= Stretch || (i + 1 == line.size() && weight == 0.0 && before > 0.0))
+    for (std::size_t b = 0; b < a; ++b)
     {
-      const double change = after / before - 1.0;
-      sum += before * change * change;
-      weight += before;
-      before = 0.0;
-      after = 0.0;
+      double sum = 0.0;
+      for (const std::int64_t p : line)
+      {
+        sum += (poses.points[a][p] - poses.points[b][p]).norm();
+      }
+      range = std::max(range, sum / static_cast<double>(line.size()));
     }
   }
-  return weight > 0.0 ? std::min(1.0, std::sqrt(sum / weight)) : 0.0;
+  return range;
 }
 }
 
 const std::array<std::string, PlacementSigns::Count>& PlacementSigns::Names()
 {
-  static const std::array<std::string, Count> names{ "unclear", "bridged", "thin", "unseen",
-    "strained" };
+  static const std::array<std::string, Count> names{ "unclear", "unseen", "seldom", "swept" };
   return names;
 }
 
 std::array<double, PlacementSigns::Count> PlacementSigns::Values() const
 {
-  return { this->unclear, this->bridged, this->thin, this->unseen, this->strained };
+  return { this->unclear, this->unseen, this->seldom, this->swept };
 }
 
-std::vector<PlacementSigns> SignsOfPlacement(const Polylines& rest, const TreeCertainty& certainty,
-  const PoseSequence& poses, std::size_t phase)
+std::vector<PlacementSigns> SignsOfPlacement(const Polylines& rest,
+  const std::vector<double>& certainty, const PoseSequence& poses, std::size_t phase,
+  const ImageTiming& timing)
 {
   constexpr RequireOf require{ "Placement" };
-  require(phase < poses.status.size(), "the poses have no status");
-  const std::vector<TrackingStatus>& status = poses.status[phase];
-  const std::vector<Vector3>& moved = poses.points[phase];
+  require(phase < poses.status.size() && poses.status.size() == poses.points.size(),
+    "the poses have no status");
   const std::size_t count = rest.points.size();
-  const auto fits = [count](const std::vector<double>& values)
-  { return values.empty() || values.size() == count; };
-  require(moved.size() == count && status.size() == count && fits(certainty.section) &&
-      fits(certainty.bridge),
-    "the lines have other points");
+  require(certainty.empty() || certainty.size() == count, "the lines have other points");
+  std::vector<double> seen; // of each phase: share of the tree
+  for (std::size_t k = 0; k < poses.status.size(); ++k)
+  {
+    require(poses.points[k].size() == count && poses.status[k].size() == count,
+      "the lines have other points");
+    // At the reference all are where they were found, vessels or not.
+    seen.push_back(CyclicDistance(poses.times[k], timing.reference) <= SameMoment
+        ? 0.0
+        : static_cast<double>(std::count_if(poses.status[k].begin(), poses.status[k].end(),
+            [](TrackingStatus own) { return !IsUnseen(own); })));
+  }
+  const double all = std::accumulate(seen.begin(), seen.end(), 0.0);
   std::vector<PlacementSigns> result;
   for (const std::vector<std::int64_t>& line : rest.lines)
   {
     PlacementSigns signs;
-    signs.unclear = 1.0 - MeanOf(certainty.section, line);
-    signs.bridged = 1.0 - MeanOf(certainty.bridge, line);
-    if (!rest.radius.empty())
+    signs.unclear = 1.0 - MeanOf(certainty, line);
+    signs.unseen = UnseenShare(poses.status[phase], line);
+    for (std::size_t k = 0; k < seen.size() && all > 0.0; ++k)
     {
-      signs.thin = 0.5 / std::max(0.25, MeanOf(rest.radius, line));
+      signs.seldom += seen[k] / all * UnseenShare(poses.status[k], line);
     }
-    signs.unseen = static_cast<double>(std::count_if(line.begin(), line.end(),
-                     [&](std::int64_t p) { return IsUnseen(status[p]); })) /
-      static_cast<double>(line.size());
-    signs.strained = LengthChange(line, rest.points, moved);
+    signs.swept = timing.window * Range(line, poses);
     result.push_back(signs);
   }
   return result;
@@ -108,7 +117,8 @@ double PlacementConfidence(const PlacementSigns& signs)
     odds += Weights[n] * values[n];
   }
   const double chance = 1.0 / (1.0 + std::exp(-odds));
-  return signs.unseen > MaximumUnseen ? std::min(chance, UnseenConfidence) : chance;
+  return std::max(signs.unseen, signs.seldom) > MaximumUnseen ? std::min(chance, UnseenConfidence)
+                                                              : chance;
 }
 
 double ConfidenceOfDeviation(double deviation)
@@ -122,10 +132,11 @@ double ConfidenceOfDeviation(double deviation)
   return std::erf(x / std::sqrt(2.0)) - std::sqrt(2.0 / EIGEN_PI) * x * std::exp(-0.5 * x * x);
 }
 
-std::vector<double> PlacementConfidences(const Polylines& rest, const TreeCertainty& certainty,
-  const PoseSequence& poses, std::size_t phase, const std::vector<double>& deviations)
+std::vector<double> PlacementConfidences(const Polylines& rest,
+  const std::vector<double>& certainty, const PoseSequence& poses, std::size_t phase,
+  const ImageTiming& timing, const std::vector<double>& deviations)
 {
-  const std::vector<PlacementSigns> signs = SignsOfPlacement(rest, certainty, poses, phase);
+  const std::vector<PlacementSigns> signs = SignsOfPlacement(rest, certainty, poses, phase, timing);
   std::vector<double> within;
   for (const double deviation : deviations)
   {
@@ -139,7 +150,7 @@ std::vector<double> PlacementConfidences(const Polylines& rest, const TreeCertai
     if (!within.empty())
     {
       // The tree's own: nothing was tracked.
-      own.unseen = own.strained = 0.0;
+      own.unseen = 0.0;
     }
     const double chance = PlacementConfidence(own) * MeanOf(within, rest.lines[l]);
     for (const std::int64_t p : rest.lines[l])

@@ -21,39 +21,43 @@ namespace coronary
 /// Mean distance of a branch from the nearest artery up to which it counts as placed, mm.
 inline constexpr double PlacedWithin = 1.0;
 
-/// How sure the tree was, per point, 0 to 1; empty: 1.
-struct TreeCertainty
+/// When the images were taken, as fractions of the R-R interval.
+struct ImageTiming
 {
-  std::vector<double> section; ///< that its section is that of a vessel
-  std::vector<double> bridge;  ///< of the bridges that lead to it
+  double reference = 0.0; ///< of the lines at rest
+  double window = 0.0;    ///< over which an image is taken
 };
 
 /// What tells whether one branch is where it is said to be at one phase.
 struct PlacementSigns
 {
-  static constexpr std::size_t Count = 5;
+  static constexpr std::size_t Count = 4;
   static const std::array<std::string, Count>& Names();
 
-  double unclear = 0.0;  ///< 1 less the mean certainty of its sections
-  double bridged = 0.0;  ///< 1 less the mean certainty of the bridges that lead to it
-  double thin = 0.5;     ///< 1/mm, of its mean diameter, 2 at most; without radii 0.5
-  double unseen = 0.0;   ///< share of its points that were filled or lost
-  double strained = 0.0; ///< root mean square change of length, of stretches of 5 mm; 1 at most
+  double unclear = 0.0; ///< 1 less the mean certainty of its sections
+  double unseen = 0.0;  ///< share of its points that were filled or lost
+  /// Mean share of its points that were filled or lost, over all phases but the reference, each weighed by how much of the tree was seen then:
+  /// what was taken for a vessel in the noise of one phase is not to be found in the others.
+  double seldom = 0.0;
+  double swept =
+    0.0; ///< mm that it moves while an image is taken, at the mean speed of its motion to and fro
 
   std::array<double, Count> Values() const;
 };
 
 /**
  * Of every line at one phase.
- * @param rest   the lines at rest
- * @param poses  the same points at its phases, with status
- * @param phase  number of a phase
+ * @param certainty  per point of the tree, 0 to 1, that its section is that of a vessel; empty: 1
+ * @param poses      the same points at its phases, with status
+ * @param phase      number of a phase
  * @throws std::invalid_argument when the poses lack a status, or anything is of other points
  */
-std::vector<PlacementSigns> SignsOfPlacement(const Polylines& rest, const TreeCertainty& certainty,
-  const PoseSequence& poses, std::size_t phase);
+std::vector<PlacementSigns> SignsOfPlacement(const Polylines& rest,
+  const std::vector<double>& certainty, const PoseSequence& poses, std::size_t phase,
+  const ImageTiming& timing);
 
-/// Probability that a branch with these signs is within PlacedWithin of an artery. Of what is mostly unseen 0.5 at most.
+/// Probability that a branch with these signs is within PlacedWithin of an artery. Of what is mostly unseen, at the phase or over
+/// all of them, 0.5 at most.
 double PlacementConfidence(const PlacementSigns& signs);
 
 /// Probability that a place is within PlacedWithin of where it is said to be, when all that is known is how far off such places
@@ -65,8 +69,9 @@ double ConfidenceOfDeviation(double deviation);
  * @param deviations  of a phase at which nothing was tracked: of each point's place, mm; else empty
  * @throws as SignsOfPlacement
  */
-std::vector<double> PlacementConfidences(const Polylines& rest, const TreeCertainty& certainty,
-  const PoseSequence& poses, std::size_t phase, const std::vector<double>& deviations = {});
+std::vector<double> PlacementConfidences(const Polylines& rest,
+  const std::vector<double>& certainty, const PoseSequence& poses, std::size_t phase,
+  const ImageTiming& timing, const std::vector<double>& deviations = {});
 }
 
 #endif

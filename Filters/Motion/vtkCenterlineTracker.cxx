@@ -126,6 +126,7 @@ struct vtkCenterlineTracker::Internals
   coronary::CenterlineTrackingReport Report;
   double Reference = 0.0;
   double Cycle = 0.0;
+  double Window = 0.0; ///< of an image, fraction of the cycle
 
   bool Knows(vtkCenterlineTracker* self, vtkInformationVector** inputs) const
   {
@@ -302,6 +303,7 @@ void vtkCenterlineTracker::Track(vtkInformationVector** inputs)
   data.Cycle =
     FieldValue(first, names::CycleLength, FieldValue(input, names::CycleLength, UsualCycleLength));
   settings.cycleLength = data.Cycle;
+  data.Window = settings.temporalWindow / data.Cycle;
 
   vtkCoronary::UpstreamRequest request(series, series);
   std::array<int, 6> whole{ 0, -1, 0, -1, 0, -1 };
@@ -392,8 +394,8 @@ int vtkCenterlineTracker::RequestData(
     };
     write(input, vtkPoseSequences::MomentOf(data.Poses, phase), output[0]);
     vtkCoronary::AddArray<vtkDoubleArray>(output[0]->GetPointData(), names::PlacementConfidence,
-      coronary::PlacementConfidences(
-        data.Lines, vtkMovedLines::CertaintyOf(input), data.Poses, phase));
+      coronary::PlacementConfidences(data.Lines, vtkMovedLines::CertaintyOf(input), data.Poses,
+        phase, { data.Reference, data.Window }));
 
     vtkInformation* skeletonInfo = Connection(inputs, SkeletonPort);
     vtkPolyData* skeleton = skeletonInfo != nullptr ? vtkPolyData::GetData(skeletonInfo) : nullptr;

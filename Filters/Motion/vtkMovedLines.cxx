@@ -92,11 +92,11 @@ void SetTimes(vtkInformationVector* outputs, const std::vector<double>& times)
   }
 }
 
-coronary::TreeCertainty CertaintyOf(vtkPolyData* lines)
+std::vector<double> CertaintyOf(vtkPolyData* lines)
 {
   coronary::VesselTree values;
   vtkCoronary::AddPointValues(lines, values);
-  return { values.confidence, values.bridgeConfidence };
+  return values.confidence;
 }
 
 Feet::Feet(const coronary::Polylines& lines, vtkPolyData* skeleton)

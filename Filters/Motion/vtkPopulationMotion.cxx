@@ -193,6 +193,8 @@ void vtkPopulationMotion::Move(vtkInformationVector** inputs, vtkInformation* ou
   Require(this->NumberOfSteps >= 4 && this->NumberOfSteps <= 200, "NumberOfSteps must be 4 to 200");
   Require(this->HeartRate == 0.0 || (this->HeartRate >= 30.0 && this->HeartRate <= 180.0),
     "HeartRate must be 0, or 30 to 180");
+  Require(
+    this->TemporalWindow >= 0.0 && this->TemporalWindow <= 1.0, "TemporalWindow must be 0 to 1 s");
   Require(this->Amplitude >= 0.0 && this->Amplitude <= 2.0, "Amplitude must be 0 to 2");
   data.Reference = this->ReferenceTime;
   if (this->AutomaticReference)
@@ -300,7 +302,8 @@ int vtkPopulationMotion::RequestData(
       output[0]);
     vtkCoronary::AddArray<vtkDoubleArray>(output[0]->GetPointData(), names::PlacementConfidence,
       coronary::PlacementConfidences(data.Lines, vtkMovedLines::CertaintyOf(input), data.Poses,
-        phase, data.IsTracked(phase) ? std::vector<double>() : data.Report.deviations[phase]));
+        phase, { data.Reference, this->TemporalWindow / data.Cycle },
+        data.IsTracked(phase) ? std::vector<double>() : data.Report.deviations[phase]));
 
     vtkInformation* skeletonInfo = Connection(inputs, SkeletonPort);
     vtkPolyData* skeleton = skeletonInfo != nullptr ? vtkPolyData::GetData(skeletonInfo) : nullptr;
@@ -325,6 +328,7 @@ void vtkPopulationMotion::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "AutomaticReference: " << this->AutomaticReference << '\n';
   os << indent << "ReferenceTime: " << this->ReferenceTime << '\n';
   os << indent << "HeartRate: " << this->HeartRate << '\n';
+  os << indent << "TemporalWindow: " << this->TemporalWindow << '\n';
   os << indent << "Amplitude: " << this->Amplitude << '\n';
   os << indent << "NumberOfSteps: " << this->NumberOfSteps << '\n';
 }

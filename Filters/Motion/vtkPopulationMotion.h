@@ -113,6 +113,15 @@ public:
 
   ///@{
   /**
+   * Seconds over which an image was taken, 0 to 1: what moves far in that time is less likely in its place
+   * (`PlacementConfidence`). Default 0.066.
+   */
+  vtkSetMacro(TemporalWindow, double);
+  vtkGetMacro(TemporalWindow, double);
+  ///@}
+
+  ///@{
+  /**
    * Moments of the cycle at which the lines are given, 4 to 200. Default 20.
    */
   vtkSetMacro(NumberOfSteps, int);
@@ -144,6 +153,7 @@ private:
   double ReferenceTime = 0.75;
   double HeartRate = 0.0;
   double Amplitude = 1.0;
+  double TemporalWindow = 0.066;
   int NumberOfSteps = 20;
   struct Internals;
   std::unique_ptr<Internals> Data;

@@ -43,18 +43,16 @@ PoseSequence AtRest(const Polylines& lines)
 TEST(BranchPlacement, SignsOfWhatIsSeen)
 {
   const Polylines lines = TwoLines();
-  const std::vector<PlacementSigns> signs = SignsOfPlacement(lines, {}, AtRest(lines), 0);
+  const std::vector<PlacementSigns> signs =
+    SignsOfPlacement(lines, {}, AtRest(lines), 0, { 0.5, 0.1 });
   ASSERT_EQ(signs.size(), 2U);
   for (const PlacementSigns& own : signs)
   {
     EXPECT_EQ(own.unclear, 0.0);
-    EXPECT_EQ(own.bridged, 0.0);
     EXPECT_EQ(own.unseen, 0.0);
-    EXPECT_EQ(own.strained, 0.0);
+    EXPECT_EQ(own.seldom, 0.0);
+    EXPECT_EQ(own.swept, 0.0);
   }
-  EXPECT_NEAR(signs[0].thin, 0.5, 1e-12);
-  EXPECT_NEAR(
-    signs[1].thin, 21.0 / 22.0, 1e-12); // the point where it leaves is as wide as the first
   EXPECT_GT(PlacementConfidence(signs[0]), 0.95);
 }
 
@@ -62,23 +60,57 @@ TEST(BranchPlacement, SignsOfWhatIsNot)
 {
   const Polylines lines = TwoLines();
   PoseSequence poses = AtRest(lines);
-  TreeCertainty certainty{ std::vector<double>(lines.points.size(), 1.0),
-    std::vector<double>(lines.points.size(), 1.0) };
-  // Half of the second line is filled, and its outer half is 20 % longer.
+  std::vector<double> certainty(lines.points.size(), 1.0);
+  // Half of the second line is filled. All moves by 3 mm to a second phase, in which all is seen.
   for (int n = 31; n <= 40; ++n)
   {
     poses.status[0][n] = n % 2 != 0 ? TrackingStatus::Lost : TrackingStatus::Filled;
-    poses.points[0][n][1] += 0.2 * (n - 30);
-    certainty.section[n] = 0.5;
-    certainty.bridge[n] = 0.3;
+    certainty[n] = 0.5;
   }
-  const std::vector<PlacementSigns> signs = SignsOfPlacement(lines, certainty, poses, 0);
+  poses.times = { 0.3, 0.7 };
+  poses.points.push_back(lines.points);
+  poses.status.emplace_back(lines.points.size(), TrackingStatus::Tracked);
+  for (Vector3& point : poses.points[1])
+  {
+    point[2] += 3.0;
+  }
+  const std::vector<PlacementSigns> signs =
+    SignsOfPlacement(lines, certainty, poses, 0, { 0.5, 0.1 });
   EXPECT_NEAR(signs[1].unseen, 10.0 / 21.0, 1e-12);
   EXPECT_NEAR(signs[1].unclear, 0.5 * 10.0 / 21.0, 1e-12);
-  EXPECT_NEAR(signs[1].bridged, 0.7 * 10.0 / 21.0, 1e-12);
-  EXPECT_NEAR(signs[1].strained, 0.2 * std::sqrt(0.5), 1e-12);
+  EXPECT_NEAR(signs[1].seldom, 31.0 / (31.0 + 41.0) * 10.0 / 21.0, 1e-12);
+  EXPECT_NEAR(signs[1].swept, 0.3, 1e-12);
   EXPECT_EQ(signs[0].unseen, 0.0);
+  EXPECT_EQ(signs[0].seldom, 0.0);
+  EXPECT_NEAR(signs[0].swept, 0.3, 1e-12);
   EXPECT_LT(PlacementConfidence(signs[1]), PlacementConfidence(signs[0]));
+}
+
+TEST(BranchPlacement, APhaseThatIsLostWhollySaysNothingOfABranch)
+{
+  const Polylines lines = TwoLines();
+  PoseSequence poses = AtRest(lines);
+  poses.times = { 0.3, 0.7 };
+  poses.points.push_back(lines.points);
+  poses.status.emplace_back(lines.points.size(), TrackingStatus::Filled);
+  EXPECT_EQ(SignsOfPlacement(lines, {}, poses, 0, { 0.5, 0.1 })[1].seldom, 0.0);
+  EXPECT_EQ(SignsOfPlacement(lines, {}, poses, 1, { 0.5, 0.1 })[1].unseen, 1.0);
+}
+
+TEST(BranchPlacement, WhatIsSeenInOnePhaseOnlyIsNeverConfident)
+{
+  const Polylines lines = TwoLines();
+  PoseSequence poses = AtRest(lines);
+  poses.times = { 0.5, 0.7, 0.9 };
+  for (int k = 1; k < 3; ++k)
+  {
+    poses.points.push_back(lines.points);
+    poses.status.push_back(poses.status[0]);
+    std::fill(poses.status[k].begin() + 21, poses.status[k].end(), TrackingStatus::Filled);
+  }
+  const std::vector<double> said = PlacementConfidences(lines, {}, poses, 0, { 0.5, 0.1 });
+  EXPECT_GT(said[0], 0.95);
+  EXPECT_LE(said[40], 0.5);
 }
 
 TEST(BranchPlacement, WhatIsMostlyUnseenIsNeverConfident)
@@ -88,14 +120,17 @@ TEST(BranchPlacement, WhatIsMostlyUnseenIsNeverConfident)
   EXPECT_LE(PlacementConfidence(signs), 0.5);
   signs.unseen = 1.0;
   EXPECT_LE(PlacementConfidence(signs), 0.5);
+  signs.unseen = 0.0;
+  signs.seldom = 0.51;
+  EXPECT_LE(PlacementConfidence(signs), 0.5);
 }
 
 TEST(BranchPlacement, OneNumberForEachLine)
 {
   const Polylines lines = TwoLines();
   const PoseSequence poses = AtRest(lines);
-  const std::vector<PlacementSigns> signs = SignsOfPlacement(lines, {}, poses, 0);
-  const std::vector<double> result = PlacementConfidences(lines, {}, poses, 0);
+  const std::vector<PlacementSigns> signs = SignsOfPlacement(lines, {}, poses, 0, { 0.5, 0.1 });
+  const std::vector<double> result = PlacementConfidences(lines, {}, poses, 0, { 0.5, 0.1 });
   EXPECT_EQ(result[3], PlacementConfidence(signs[0]));
   EXPECT_EQ(result[20], PlacementConfidence(signs[0])); // where they meet: the first
   EXPECT_EQ(result[40], PlacementConfidence(signs[1]));
@@ -105,10 +140,10 @@ TEST(BranchPlacement, WhatWasNotTrackedIsAsSureAsItsDeviationTells)
 {
   const Polylines lines = TwoLines();
   PoseSequence poses = AtRest(lines);
-  const double sure = PlacementConfidences(lines, {}, poses, 0)[40];
+  const double sure = PlacementConfidences(lines, {}, poses, 0, { 0.5, 0.1 })[40];
   poses.status[0].assign(lines.points.size(), TrackingStatus::Filled);
   const std::vector<double> deviations(lines.points.size(), 2.0);
-  EXPECT_NEAR(PlacementConfidences(lines, {}, poses, 0, deviations)[40],
+  EXPECT_NEAR(PlacementConfidences(lines, {}, poses, 0, { 0.5, 0.1 }, deviations)[40],
     sure * ConfidenceOfDeviation(2.0), 1e-12);
 }
 
@@ -126,10 +161,11 @@ TEST(BranchPlacement, RefusesOtherLines)
   const Polylines lines = TwoLines();
   PoseSequence poses = AtRest(lines);
   poses.status.clear();
-  EXPECT_THROW(SignsOfPlacement(lines, {}, poses, 0), std::invalid_argument);
+  EXPECT_THROW(SignsOfPlacement(lines, {}, poses, 0, { 0.5, 0.1 }), std::invalid_argument);
   poses = AtRest(lines);
   poses.status[0].pop_back();
-  EXPECT_THROW(SignsOfPlacement(lines, {}, poses, 0), std::invalid_argument);
-  EXPECT_THROW(SignsOfPlacement(lines, { { 1.0 }, {} }, AtRest(lines), 0), std::invalid_argument);
+  EXPECT_THROW(SignsOfPlacement(lines, {}, poses, 0, { 0.5, 0.1 }), std::invalid_argument);
+  EXPECT_THROW(
+    SignsOfPlacement(lines, { 1.0 }, AtRest(lines), 0, { 0.5, 0.1 }), std::invalid_argument);
 }
 }

@@ -83,18 +83,33 @@ std::vector<double> Values(vtkPolyData* data, const char* name)
   return values;
 }
 
-/// The tree at one moment, as what was tracked.
-PoseSequence PosesOf(vtkPolyData* data, double time)
+/// The tree at these moments, as what was tracked.
+PoseSequence PosesOf(Series& series, const std::vector<double>& times)
 {
   PoseSequence poses;
-  poses.times = { time };
-  poses.points = { LinesOf(data).points };
-  poses.status.emplace_back();
-  for (const double value : Values(data, names::TrackingStatus))
+  poses.times = times;
+  for (const double time : times)
   {
-    poses.status.back().push_back(static_cast<TrackingStatus>(static_cast<int>(value)));
+    const vtkSmartPointer<vtkPolyData> data = series.At(time);
+    poses.points.push_back(LinesOf(data).points);
+    poses.status.emplace_back();
+    for (const double value : Values(data, names::TrackingStatus))
+    {
+      poses.status.back().push_back(static_cast<TrackingStatus>(static_cast<int>(value)));
+    }
   }
   return poses;
+}
+
+/// @throws std::runtime_error naming the array
+double FieldNumber(vtkPolyData* data, const char* name)
+{
+  vtkDataArray* array = data->GetFieldData()->GetArray(name);
+  if (array == nullptr)
+  {
+    throw std::runtime_error(std::string("the moving tree has no field array ") + name);
+  }
+  return array->GetComponent(0, 0);
 }
 
 /// Mean distance of a line's points from the nearest true axis, mm.
@@ -147,26 +162,25 @@ void Judge(const std::string& run, const std::string& truth, const std::string& 
   {
     throw std::runtime_error("'" + run + "' has no report.json: it is no folder of `run`");
   }
-  const auto motion = nlohmann::json::parse(file).at("motion");
+  const auto report = nlohmann::json::parse(file);
+  const auto& motion = report.at("motion");
   const double limit = PlacedWithin + shift;
   Series found(run + "/motion/centerline.vtp.series");
   Series real(truth + "/centerline.pvd");
   const auto times = motion.at("tracked_times").get<std::vector<double>>();
   const vtkSmartPointer<vtkPolyData> first = found.At(times.front());
-  vtkDataArray* reference = first->GetFieldData()->GetArray(names::ReferenceTime);
-  if (reference == nullptr)
-  {
-    throw std::runtime_error("the moving tree has no field array ReferenceTime");
-  }
-  const Polylines rest = LinesOf(found.At(reference->GetComponent(0, 0)));
+  const ImageTiming timing{ FieldNumber(first, names::ReferenceTime),
+    1e-3 * report.at("settings").at("temporal_window_ms").get<double>() /
+      FieldNumber(first, names::CycleLength) };
+  const Polylines rest = LinesOf(found.At(timing.reference));
   VesselTree tree;
   vtkCoronary::AddPointValues(first, tree);
-  for (const double time : times)
+  const PoseSequence poses = PosesOf(found, times);
+  for (std::size_t k = 0; k < times.size(); ++k)
   {
-    const PoseSequence poses = PosesOf(found.At(time), time);
-    const Polylines truly = LinesOf(real.At(time));
+    const Polylines truly = LinesOf(real.At(times[k]));
     const std::vector<PlacementSigns> signs =
-      SignsOfPlacement(rest, { tree.confidence, tree.bridgeConfidence }, poses, 0);
+      SignsOfPlacement(rest, tree.confidence, poses, k, timing);
     for (std::size_t l = 0; l < rest.lines.size(); ++l)
     {
       const std::vector<std::int64_t>& line = rest.lines[l];
@@ -174,7 +188,7 @@ void Judge(const std::string& run, const std::string& truth, const std::string& 
       {
         continue;
       }
-      const bool placed = MeanDistance(line, poses.points[0], truly) <= limit;
+      const bool placed = MeanDistance(line, poses.points[k], truly) <= limit;
       const Vector3& middle = rest.points[line[line.size() / 2]];
       std::printf("%s,%s,%d,1,%.4f,%.1f,%.1f,%.1f", condition.c_str(), seed.c_str(), placed ? 1 : 0,
         PlacementConfidence(signs[l]), middle[0], middle[1], middle[2]);
