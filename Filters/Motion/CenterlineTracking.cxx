@@ -331,9 +331,9 @@ PoseSequence LineTracker::Run()
   if (this->Settings.tissue)
   {
     this->Surroundings = this->SearchFinely(false, 0.6);
-    this->Fit({ &this->Surroundings });
   }
   {
+    // From where the first search ended: what bends deceives the surroundings more than the vessels.
     const Seen vessels = this->SearchFinely(true, 0.7);
     this->Fit(this->WithSurroundings(vessels));
   }

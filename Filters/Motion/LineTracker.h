@@ -24,6 +24,9 @@ class WideningField;
 /// Beyond the patch, the search and the smearing: what the places may still move, mm.
 constexpr double SpareReach = 3.0;
 
+/// Of what is compared of a vessel in the first search, mm.
+constexpr double CoarseVesselRadius = 6.0;
+
 inline double NodeRadius(const LineNodes& nodes, int node)
 {
   return nodes.radius.empty() ? 1.5 : nodes.radius[node];
@@ -48,6 +51,7 @@ public:
     , Sharing(sharing)
     , Nodes(PlaceNodes(lines, settings.nodeSpacing))
     , Coarse(settings.coarseRadius, settings.coarseSpacing)
+    , CoarseVessel(CoarseVesselRadius, settings.coarseSpacing)
     , Fine(settings.fineRadius, 1.0)
     , Core(3.0, 0.5)
   {
@@ -148,6 +152,7 @@ private:
 
   LineNodes Nodes;
   Patch Coarse;
+  Patch CoarseVessel;
   Patch Fine;
   Patch Core;
   Vector3 Low;

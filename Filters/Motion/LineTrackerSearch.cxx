@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numeric>
 
@@ -13,6 +14,33 @@ namespace
 {
 /// Nothing is found better than that, or than a share of a voxel, mm.
 constexpr double TissueDeviation = 0.5;
+/// What the first search is told by the tissue around a vessel, and by the vessel with what lies next to it: so much at most, in
+/// natural logarithms. A heart that contracts bends the tissue, which is then alike elsewhere.
+constexpr double CoarseTissueLimit = 2.0;
+constexpr double CoarseLimit = 20.0;
+/// How far a vessel moves between phases that are neighbours in time: one standard deviation along each axis, mm.
+constexpr double UsualStep = 8.0;
+
+/// What UsualStep says of every shift.
+void PreferShort(const LabelLattice& lattice, std::vector<std::vector<float>>& costs)
+{
+  std::vector<float> far;
+  for (int k = -lattice.reach; k <= lattice.reach; ++k)
+  {
+    for (int j = -lattice.reach; j <= lattice.reach; ++j)
+    {
+      for (int i = -lattice.reach; i <= lattice.reach; ++i)
+      {
+        const double steps = lattice.step / UsualStep;
+        far.push_back(static_cast<float>(0.5 * steps * steps * (i * i + j * j + k * k)));
+      }
+    }
+  }
+  for (std::vector<float>& own : costs)
+  {
+    std::transform(own.begin(), own.end(), far.begin(), own.begin(), std::plus<>());
+  }
+}
 }
 
 void LineTracker::PlaceBox()
@@ -46,7 +74,7 @@ void LineTracker::SearchCoarsely()
   const LabelLattice lattice{ static_cast<int>(std::ceil(
                                 this->Settings.captureRange / this->Settings.coarseSpacing)),
     this->Settings.coarseSpacing };
-  const int blockReach = this->Coarse.reach + lattice.reach;
+  const int blockReach = std::max(this->Coarse.reach, this->CoarseVessel.reach) + lattice.reach;
   const int blockSide = 2 * blockReach + 1;
 
   this->PlaceBox();
@@ -63,20 +91,32 @@ void LineTracker::SearchCoarsely()
   const std::vector<std::vector<float>> weights = this->Settings.tissue
     ? this->WithoutVessels(this->Coarse, 0.5 * this->Settings.coarseSpacing)
     : std::vector<std::vector<float>>(nodes, this->Coarse.weights);
-  std::vector<std::vector<float>> wanted(nodes);
-  std::vector<float> all;
-  for (std::int64_t n = 0; n < nodes; ++n)
+  const auto valuesOf = [&](const Patch& patch)
   {
-    for (std::size_t p = 0; p < this->Coarse.places.size(); ++p)
+    std::vector<std::vector<float>> values(nodes);
+    for (std::int64_t n = 0; n < nodes; ++n)
     {
-      wanted[n].push_back(averaged.Sample(this->Nodes.position[n] + this->Coarse.Offset(p)));
-      all.push_back(wanted[n].back());
+      for (std::size_t p = 0; p < patch.places.size(); ++p)
+      {
+        values[n].push_back(averaged.Sample(this->Nodes.position[n] + patch.Offset(p)));
+      }
     }
+    return values;
+  };
+  std::vector<std::vector<float>> wanted = valuesOf(this->Coarse);
+  std::vector<std::vector<float>> wantedVessel = valuesOf(this->CoarseVessel);
+  std::vector<float> all;
+  for (const std::vector<float>& one : wanted)
+  {
+    all.insert(all.end(), one.begin(), one.end());
   }
   this->LimitValues(std::move(all));
-  for (std::vector<float>& one : wanted)
+  for (std::vector<std::vector<float>>* values : { &wanted, &wantedVessel })
   {
-    std::transform(one.begin(), one.end(), one.begin(), this->Limits);
+    for (std::vector<float>& one : *values)
+    {
+      std::transform(one.begin(), one.end(), one.begin(), this->Limits);
+    }
   }
 
   this->SortPhases();
@@ -91,6 +131,7 @@ void LineTracker::SearchCoarsely()
       ? std::vector<Vector3>(nodes, Vector3::Zero())
       : this->Displacement[this->Order[static_cast<std::size_t>(guesses[position])]];
     std::vector<std::vector<float>> costs(nodes);
+    std::vector<std::vector<float>> ofVessels(nodes);
     ParallelFor(
       nodes, 4,
       [&](std::int64_t first, std::int64_t last)
@@ -112,11 +153,27 @@ void LineTracker::SearchCoarsely()
           }
           SumsOfSquares(
             block, blockSide, this->Coarse, weights[n], wanted[n], lattice.reach, costs[n]);
+          if (this->Settings.tissue)
+          {
+            SumsOfSquares(block, blockSide, this->CoarseVessel, this->CoarseVessel.weights,
+              wantedVessel[n], lattice.reach, ofVessels[n]);
+          }
         }
       },
       this->Part(0.6 * (static_cast<double>(position) + 0.3) / static_cast<double>(phases),
         0.6 * static_cast<double>(position + 1) / static_cast<double>(phases)));
-    ToLikelihoods(costs, 30.0, 20.0, 0.1 * this->NoiseFloor());
+    ToLikelihoods(costs, 30.0, this->Settings.tissue ? CoarseTissueLimit : CoarseLimit,
+      0.1 * this->NoiseFloor());
+    if (this->Settings.tissue)
+    {
+      ToLikelihoods(ofVessels, 10.0, CoarseLimit, 0.1 * this->NoiseFloor());
+      for (std::int64_t n = 0; n < nodes; ++n)
+      {
+        std::transform(
+          costs[n].begin(), costs[n].end(), ofVessels[n].begin(), costs[n].begin(), std::plus<>());
+      }
+    }
+    PreferShort(lattice, costs);
     const std::vector<Vector3> best = BestDisplacements(this->Nodes, lattice, costs, 0.5);
     for (std::int64_t n = 0; n < nodes; ++n)
     {

@@ -38,6 +38,7 @@ void SumsOfSquares(const std::vector<float>& block, int blockSide, const Patch& 
   std::vector<float>& costs)
 {
   const int side = 2 * labelReach + 1;
+  const int first = blockSide / 2 - labelReach; // of the shifts, in the block, along each axis
   costs.assign(static_cast<std::size_t>(side) * side * side, 0.0F);
   for (std::size_t p = 0; p < patch.places.size(); ++p)
   {
@@ -48,10 +49,8 @@ void SumsOfSquares(const std::vector<float>& block, int blockSide, const Patch& 
       continue;
     }
     const float value = wanted[p];
-    // The block's corner is -(patch reach + label reach).
     const float* corner = block.data() +
-      ((place[2] + patch.reach) * blockSide + place[1] + patch.reach) * blockSide + place[0] +
-      patch.reach;
+      ((place[2] + first) * blockSide + place[1] + first) * blockSide + place[0] + first;
     for (int k = 0; k < side; ++k)
     {
       for (int j = 0; j < side; ++j)

@@ -33,7 +33,8 @@ struct Patch
   Patch(double radius, double spacing);
 };
 
-/// Weighted mean squared difference of `wanted` and the block, for every shift of the lattice.
+/// Weighted mean squared difference of `wanted` and the block, for every shift of the lattice. The block is centred on the node,
+/// and reaches at least as far as patch and shifts together.
 void SumsOfSquares(const std::vector<float>& block, int blockSide, const Patch& patch,
   const std::vector<float>& weights, const std::vector<float>& wanted, int labelReach,
   std::vector<float>& costs);
