@@ -16,7 +16,7 @@ EOF
 }
 
 common=(
-  g++ cmake ninja-build ccache
+  g++ cmake ninja-build ccache mold
   libeigen3-dev libsuitesparse-dev libgdcm-dev zlib1g-dev libexpat1-dev nlohmann-json3-dev libcli11-dev libtet1.5-dev
   libcgal-dev libxrl-dev
   libfreetype-dev libgif-dev libglew-dev libx11-dev

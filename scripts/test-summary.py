@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """What ran, what was skipped and why, and how long each label took, of the JUnit file that CTest writes.
 
-Usage: scripts/test-summary.py NAME JUNIT.xml
+Usage: scripts/test-summary.py NAME JUNIT.xml LIST.json
+The list is what `ctest --show-only=json-v1` prints: it has the labels.
 A test that did a part only and says so in a line that begins with 'skipped: ' is named too. Testing/time-budgets.json has the
 seconds that the tests of a label may take one after another; what takes more is said, and fails nothing: machines differ.
 """
@@ -21,16 +22,19 @@ def reason(output):
     return "; ".join(dict.fromkeys(" ".join(text.split()) for text in said)) or "it does not say why"
 
 
-def labels_of(case):
-    """The first of a test's labels is its kind; the others say when it runs."""
-    for item in case.iter("property"):
-        if item.get("name") == "cmake_labels":
-            return item.get("value").split(";")
-    return ["none"]
+def labels_of(path):
+    """Of each test: nightly, or its kind, which is the first of its labels."""
+    labels = {}
+    with open(path, encoding="utf-8") as file:
+        for test in json.load(file)["tests"]:
+            own = [value for item in test["properties"] if item["name"] == "LABELS" for value in item["value"]]
+            labels[test["name"]] = "nightly" if "nightly" in own else own[0] if own else "none"
+    return labels
 
 
 def main():
-    name, path = sys.argv[1:3]
+    name, path, tests = sys.argv[1:4]
+    labels = labels_of(tests)
     with open(os.path.join(os.path.dirname(os.path.abspath(__file__)), "../Testing/time-budgets.json"), encoding="utf-8") as file:
         budgets = json.load(file)
     ran, skipped, partly, seconds = 0, [], [], {}
@@ -42,7 +46,7 @@ def main():
         ran += 1
         if re.search(r"^skipped: ", output, re.MULTILINE):
             partly.append((case.get("name"), reason(output)))
-        label = "nightly" if "nightly" in labels_of(case) else labels_of(case)[0]
+        label = labels[case.get("name")]
         seconds[label] = seconds.get(label, 0.0) + float(case.get("time"))
     print("%s: %d tests ran, %d were skipped%s" % (name, ran, len(skipped), ":" if skipped else ""))
     for test, why in skipped:

@@ -108,6 +108,7 @@ for index in "${!trees[@]}"; do
     set +m
   fi
   echo "== $tree: testing"
+  ctest --preset "$tree" --show-only=json-v1 >"$logs/$tree-tests.json"
   # The sources have been checked.
   if ! ctest --preset "$tree" -j "$jobs" --no-tests=error -E '^CheckSources$' --output-junit "$logs/$tree-tests.xml" \
     --test-output-size-passed 100000 2>&1 | tee "$logs/$tree-tests.log"; then
@@ -118,7 +119,7 @@ done
 echo
 for tree in "${trees[@]}"; do
   if [ -f "$logs/$tree-tests.xml" ]; then
-    scripts/test-summary.py "$tree" "$logs/$tree-tests.xml" || failed+=("$tree-summary")
+    scripts/test-summary.py "$tree" "$logs/$tree-tests.xml" "$logs/$tree-tests.json" || failed+=("$tree-summary")
   fi
 done
 for tree in "${trees[@]}"; do
