@@ -1,4 +1,16 @@
-# Warnings and sanitizers for our own targets; the generated wrapping code is left alone.
+# How everything is linked; warnings and sanitizers for our own targets, the generated wrapping code is left alone.
+
+# The fastest linker that is there.
+if(NOT DYNAMICCORONARY_SANITIZE)
+  include(CheckLinkerFlag)
+  foreach(linker IN ITEMS mold lld)
+    check_linker_flag(CXX "-fuse-ld=${linker}" DYNAMICCORONARY_LINKER_${linker})
+    if(DYNAMICCORONARY_LINKER_${linker})
+      add_link_options("-fuse-ld=${linker}")
+      break()
+    endif()
+  endforeach()
+endif()
 
 add_library(dynamiccoronary_options INTERFACE)
 target_compile_options(dynamiccoronary_options INTERFACE -Wall -Wextra -Wshadow)

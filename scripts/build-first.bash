@@ -35,7 +35,17 @@ refuse_option() {
   exit 2
 }
 
-# Installs what is missing and builds for ParaView. LOG [option of cmake --build]...
+# Says every half minute how far the build is that writes a log, as long as this script runs.
+report_progress() {
+  local log="$1" begun="$SECONDS" passed
+  while sleep 30 >/dev/null && kill -0 "$$" 2>/dev/null; do
+    passed=$((SECONDS - begun))
+    printf '   %d:%02d min  %s\n' $((passed / 60)) $((passed % 60)) \
+      "$(grep -aoE '^\[[0-9]+/[0-9]+\] [^/]*' "$log" 2>/dev/null | tail -n 1 || true)"
+  done
+}
+
+# Installs what is missing and builds what is installed, without the tests, for ParaView. LOG [option of cmake --build]...
 install_and_build() {
   local log="$1"
   shift
@@ -45,7 +55,16 @@ install_and_build() {
   fi
   echo "== Building (log: $log)"
   mkdir -p "$(dirname "$log")"
-  if ! { cmake --preset paraview && cmake --build --preset paraview -j "$jobs" "$@"; } >"$log" 2>&1; then
+  # A tree that has tests keeps them: its developer wants them.
+  local tests=OFF
+  if grep -qs '^BUILD_TESTING:[A-Z]*=ON' build/paraview/CMakeCache.txt; then
+    tests=ON
+  fi
+  report_progress "$log" &
+  local reporter=$! built=yes
+  { cmake --preset paraview -D "BUILD_TESTING=$tests" && cmake --build --preset paraview -j "$jobs" "$@"; } >"$log" 2>&1 || built=no
+  kill "$reporter" 2>/dev/null || true
+  if [ "$built" = no ]; then
     tail -n 40 "$log" >&2
     exit 1
   fi

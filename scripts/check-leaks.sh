@@ -49,7 +49,7 @@ filters="$tree/bin/TestMemoryGrowth"
 road="$tree/bin/soak-pipeline"
 for program in "$filters" "$road"; do
   if [ ! -x "$program" ]; then
-    echo "check-leaks: no $program; build the tree first" >&2
+    echo "check-leaks: no $program; build the tree first, with -D DYNAMICCORONARY_NIGHTLY_TESTS=ON" >&2
     exit 2
   fi
 done

@@ -5,21 +5,22 @@ set -euo pipefail
 
 usage() {
   cat <<'EOF'
-Usage: scripts/install-dependencies.sh [--check] [--tree paraview|vtk] [--no-tests] [--developer]
+Usage: scripts/install-dependencies.sh [--check] [--tree paraview|vtk] [--no-tests] [--nightly] [--developer]
   --check      change nothing; name what is missing and exit 1, exit 0 when all is there
   --tree TREE  packages of one tree only (both without this option)
   --no-tests   without the browser and what else only tests use
-  --developer  clang, valgrind, heaptrack, clang-tidy, shellcheck, and ITK and elastix, which are compared with, as well
+  --nightly    Google's benchmark library, and ITK and elastix, which are compared with, as well
+  --developer  what --nightly adds, and clang, valgrind, heaptrack, clang-tidy, shellcheck
 Runs as root, or through sudo. Run again, it changes nothing.
 EOF
 }
 
 common=(
-  g++ cmake ninja-build ccache
+  g++ cmake ninja-build ccache mold
   libeigen3-dev libsuitesparse-dev libgdcm-dev zlib1g-dev libexpat1-dev nlohmann-json3-dev libcli11-dev libtet1.5-dev
   libcgal-dev libxrl-dev
   libfreetype-dev libgif-dev libglew-dev libx11-dev
-  libgtest-dev clang-format-14 xvfb xauth
+  xvfb xauth
   dpkg-dev file python3
   pkg-config libevdev-dev libopenigtlink-dev
 )
@@ -33,14 +34,19 @@ vtk=(
   libtbb-dev libjsoncpp-dev libdouble-conversion3 libexpat1 libjpeg62-turbo liblz4-1 liblzma5 libopenmpi3
   libpng16-16 libtiff6 patchelf
 )
-# For tests that skip without them.
-tests=(chromium nodejs curl ca-certificates)
-developer=(clang libclang-rt-14-dev valgrind heaptrack clang-tidy-14 shellcheck libbenchmark-dev libinsighttoolkit5-dev plastimatch elastix)
+# For tests; without those of the second line some are skipped.
+tests=(
+  libgtest-dev clang-format-14
+  chromium nodejs curl ca-certificates plastimatch
+)
+nightly=(libbenchmark-dev libinsighttoolkit5-dev elastix)
+developer=(clang libclang-rt-14-dev valgrind heaptrack clang-tidy-14 shellcheck)
 
 check_only=no
 tree=all
 with_developer=no
 with_tests=yes
+with_nightly=no
 while [ $# -gt 0 ]; do
   case "$1" in
     --check) check_only=yes ;;
@@ -50,6 +56,7 @@ while [ $# -gt 0 ]; do
       ;;
     --tree=*) tree="${1#*=}" ;;
     --no-tests) with_tests=no ;;
+    --nightly) with_nightly=yes ;;
     --developer) with_developer=yes ;;
     -h | --help)
       usage
@@ -75,6 +82,9 @@ case "$tree" in
 esac
 if [ "$with_tests" = yes ]; then
   wanted+=("${tests[@]}")
+fi
+if [ "$with_nightly" = yes ] || [ "$with_developer" = yes ]; then
+  wanted+=("${nightly[@]}")
 fi
 if [ "$with_developer" = yes ]; then
   wanted+=("${developer[@]}")

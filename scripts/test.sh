@@ -1,15 +1,16 @@
 #!/usr/bin/env bash
-# Installs what is needed, builds both trees, runs every test, and ends with CTest's summaries.
+# Installs what is needed, builds both trees, runs the tests, says what was skipped, and ends with CTest's summaries.
 set -euo pipefail
 
 usage() {
   cat <<'EOF'
-Usage: scripts/test.sh [--tree paraview|vtk] [--sanitizers] [--no-install] [-j N]
+Usage: scripts/test.sh [--tree paraview|vtk] [--nightly] [--sanitizers] [--no-install] [-j N]
   --tree TREE    one tree only (default: ParaView 5.11 and plain VTK 9.1)
+  --nightly      also what takes long, measures time or compares with other programs, on a machine with nothing else to do
   --sanitizers   also the asan and tsan trees (plain VTK)
   --no-install   use what is installed
   -j N           parallel jobs (default: all cores)
-Build trees are build/paraview, build/vtk, build/asan and build/tsan.
+Build trees are build/paraview, build/vtk, build/asan and build/tsan; logs and JUnit files are in build/logs.
 EOF
 }
 
@@ -18,6 +19,7 @@ root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 source "$root/scripts/build-first.bash"
 trees=(paraview vtk)
 sanitizers=no
+nightly=OFF
 while [ $# -gt 0 ]; do
   taken=1
   case "$1" in
@@ -26,6 +28,7 @@ while [ $# -gt 0 ]; do
       taken=$(($# > 1 ? 2 : 1))
       ;;
     --tree=*) trees=("${1#*=}") ;;
+    --nightly) nightly=ON ;;
     --sanitizers) sanitizers=yes ;;
     *) build_option "$@" || refuse_option "$1" ;;
   esac
@@ -45,11 +48,14 @@ if [ ${#trees[@]} -eq 1 ] && ! { [ "${trees[0]}" = paraview ] && [ "$sanitizers"
   needed="${trees[0]}"
 fi
 if [ "$install" = yes ]; then
-  if [ "$needed" = all ]; then
-    scripts/install-dependencies.sh
-  else
-    scripts/install-dependencies.sh --tree "$needed"
+  wanted=()
+  if [ "$needed" != all ]; then
+    wanted+=(--tree "$needed")
   fi
+  if [ "$nightly" = ON ]; then
+    wanted+=(--nightly)
+  fi
+  scripts/install-dependencies.sh ${wanted[@]+"${wanted[@]}"}
 fi
 if [ "$sanitizers" = yes ]; then
   trees+=(asan tsan)
@@ -69,7 +75,7 @@ build() {
     DYNAMICCORONARY_VTK_DIR="$(scripts/vtk-prefix.sh)"
     export DYNAMICCORONARY_VTK_DIR
   fi
-  cmake --preset "$1" && cmake --build --preset "$1" -j "$jobs"
+  cmake --preset "$1" -D "DYNAMICCORONARY_NIGHTLY_TESTS=$nightly" && cmake --build --preset "$1" -j "$jobs"
 }
 
 # The process group that builds the next tree with what the tests leave of the cores: some of them want to be alone.
@@ -80,7 +86,7 @@ for index in "${!trees[@]}"; do
   tree="${trees[index]}"
   next="${trees[index + 1]:-}"
   log="$logs/$tree-build.log"
-  rm -f "$logs/$tree-tests.log"
+  rm -f "$logs/$tree-tests.log" "$logs/$tree-tests.xml"
   built=yes
   if [ -n "$beside" ]; then
     echo "== $tree: building, begun beside the tests (log: build/logs/$tree-build.log)"
@@ -102,13 +108,20 @@ for index in "${!trees[@]}"; do
     set +m
   fi
   echo "== $tree: testing"
+  ctest --preset "$tree" --show-only=json-v1 >"$logs/$tree-tests.json"
   # The sources have been checked.
-  if ! ctest --preset "$tree" -j "$jobs" --no-tests=error -E '^CheckSources$' 2>&1 | tee "$logs/$tree-tests.log"; then
+  if ! ctest --preset "$tree" -j "$jobs" --no-tests=error -E '^CheckSources$' --output-junit "$logs/$tree-tests.xml" \
+    --test-output-size-passed 100000 2>&1 | tee "$logs/$tree-tests.log"; then
     failed+=("$tree-tests")
   fi
 done
 
 echo
+for tree in "${trees[@]}"; do
+  if [ -f "$logs/$tree-tests.xml" ]; then
+    scripts/test-summary.py "$tree" "$logs/$tree-tests.xml" "$logs/$tree-tests.json" || failed+=("$tree-summary")
+  fi
+done
 for tree in "${trees[@]}"; do
   echo "== $tree"
   if [ -f "$logs/$tree-tests.log" ]; then

@@ -44,7 +44,7 @@ def say(text):
 def needed(name):
     path = shutil.which(name)
     if not path:
-        raise Failed("%s is missing; this validation compares with it (scripts/install-dependencies.sh --developer)" % name)
+        raise Failed("%s is missing; this validation compares with it (scripts/install-dependencies.sh --nightly)" % name)
     return path
 
 
@@ -62,7 +62,7 @@ class Peers:
         self.options = options
         self.program = os.path.join(options.build, "bin", "coronary-pipeline")
         if not os.access(self.program, os.X_OK):
-            raise Failed("no %s: build the tree first (cmake --build --preset paraview)" % self.program)
+            raise Failed("no %s: build it first (cmake --preset paraview -D DYNAMICCORONARY_NIGHTLY_TESTS=ON, cmake --build --preset paraview)" % self.program)
         self.elastix, self.transformix, self.pvpython = needed("elastix"), needed("transformix"), needed("pvpython")
         self.parameters = parameters(options.quick)
         self.itk = os.path.join(options.build, "bin", "itk-segmentation")
@@ -256,7 +256,7 @@ def print_tables(cases):
     print("\nThe wall in the reference phase. ITK: objectness (the scales and c of ours), region of at least 0.1 and 200 HU that hangs on "
           "the true ostia; ours from the images alone, stages to `surface`. MSD: from the model to the truth, and back.\n")
     if any(case["rest"] is None for case in cases):
-        print("**ITK was not compared**: itk-segmentation was not built (scripts/install-dependencies.sh --developer).\n")
+        print("**ITK was not compared**: itk-segmentation was not built (scripts/install-dependencies.sh --nightly).\n")
     print("| case | model | MSD | MSD, back | HD95 | HD | wall, s | processor, s | peak, GB |")
     print("|---|---|---|---|---|---|---|---|---|")
     for case in cases:

@@ -48,7 +48,7 @@ def rows_of(options, build, kind):
     program = os.path.join(build, "bin", "coronary-pipeline")
     judge = os.path.join(build, "bin", "validate-placement")
     if not os.access(judge, os.X_OK):
-        raise Failed("no %s: build the tree first (cmake --build --preset paraview)" % judge)
+        raise Failed("no %s: build it first (cmake --preset paraview -D DYNAMICCORONARY_NIGHTLY_TESTS=ON, cmake --build --preset paraview)" % judge)
     version = "of any program" if options.keep_runs else kept_results.digest_of_program(program, build)
     tables = []
     for number, (condition, (image, window)) in enumerate(CONDITIONS.items()):

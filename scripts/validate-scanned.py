@@ -68,7 +68,7 @@ class Matrix:
         self.folder = os.path.join(options.output, "scanned-quick" if options.quick else "scanned")
         self.program = os.path.join(options.build, "bin", "coronary-pipeline")
         if not os.access(self.program, os.X_OK):
-            raise Failed("no %s: build the tree first (cmake --build --preset paraview)" % self.program)
+            raise Failed("no %s: build it first (cmake --preset paraview -D DYNAMICCORONARY_NIGHTLY_TESTS=ON, cmake --build --preset paraview)" % self.program)
         self.version = kept_results.digest_of_program(self.program, options.build)
         self.images_version = "of any program" if options.keep_images else self.version
         self.threads = str(options.threads or os.cpu_count())

@@ -132,7 +132,7 @@ for table in "${tables[@]}"; do
       continue
     fi
     # All of them are looked for first: nobody wants to hear of it after an hour.
-    echo "validate: no $build/bin/$program: build the tree first (cmake --build --preset paraview)" >&2
+    echo "validate: no $build/bin/$program: build it first (cmake --preset paraview -D DYNAMICCORONARY_NIGHTLY_TESTS=ON, cmake --build --preset paraview)" >&2
     exit 1
   fi
   chosen+=("$table")

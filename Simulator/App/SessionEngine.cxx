@@ -37,6 +37,10 @@ SessionEngine::SessionEngine(
   , TicksPerScene(std::max<std::uint64_t>(
       1, static_cast<std::uint64_t>(std::lround(this->TickRate / this->Options.sceneRate))))
 {
+  if (!this->Options.clock)
+  {
+    this->Options.clock = [start = Clock::now()] { return SecondsSince(start); };
+  }
   this->Input = this->Session.StartInput();
   if (!this->Options.replay.empty())
   {
@@ -341,9 +345,10 @@ void SessionEngine::Rest()
 {
   this->RateOfTicks = 0.0;
   this->Load = 0.0;
-  const Clock::time_point start = Clock::now();
+  const double start = this->Options.clock();
   std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  for (auto n = std::lround(SecondsSince(start) * this->TickRate); n > 0 && this->Mux; --n)
+  for (auto n = std::lround((this->Options.clock() - start) * this->TickRate); n > 0 && this->Mux;
+       --n)
   {
     this->ReadHands(true);
   }
@@ -352,8 +357,8 @@ void SessionEngine::Rest()
 void SessionEngine::RunPhysics()
 {
   FixedStepClock clock(this->TickRate, CatchUp);
-  const Clock::time_point start = Clock::now();
-  Clock::time_point second = start;
+  const std::function<double()>& time = this->Options.clock;
+  double second = time();
   double worked = 0.0;
   std::uint64_t ticksBefore = 0;
   double pausedFor = 0.0;
@@ -361,18 +366,18 @@ void SessionEngine::RunPhysics()
   {
     while (!this->Quit)
     {
-      const double now = SecondsSince(start);
+      const double now = time();
       if (this->Paused)
       {
         this->Rest();
-        pausedFor += SecondsSince(start) - now;
+        pausedFor += time() - now;
         ticksBefore = this->TickNumber;
         worked = 0.0;
-        second = Clock::now();
+        second = time();
         continue;
       }
       const std::int64_t due = clock.Due(now - pausedFor);
-      const Clock::time_point before = Clock::now();
+      const double before = time();
       for (std::int64_t n = 0; n < due && !this->Quit; ++n)
       {
         if (!this->Tick())
@@ -381,8 +386,8 @@ void SessionEngine::RunPhysics()
           return;
         }
       }
-      worked += SecondsSince(before);
-      const double interval = SecondsSince(second);
+      worked += time() - before;
+      const double interval = time() - second;
       if (interval >= 1.0)
       {
         this->RateOfTicks = static_cast<double>(this->TickNumber - ticksBefore) / interval;
@@ -390,7 +395,7 @@ void SessionEngine::RunPhysics()
         this->Lost = clock.LostSeconds();
         ticksBefore = this->TickNumber;
         worked = 0.0;
-        second = Clock::now();
+        second = time();
       }
       std::this_thread::sleep_for(std::chrono::microseconds(300));
     }

@@ -16,6 +16,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -31,6 +32,8 @@ struct EngineOptions
   DriveScript script; ///< its heart rates are set; its hands are a ScriptDevice of the mux
   std::vector<std::int64_t> wallPoints; ///< of SessionSnapshot::wall
   double sceneRate = 30.0;              ///< snapshots for the scene a second
+  std::function<double()>
+    clock; ///< s, never less than before: what the physics keeps up with; empty: real time
 };
 
 /// How well real time is kept.

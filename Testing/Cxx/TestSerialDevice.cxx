@@ -312,24 +312,17 @@ TEST(SerialDevice, WrongDevice)
 
 TEST(SerialDevice, DrivesByteByByteWithJunk)
 {
-  // A machine that is busy for a tenth of a second loses states, and holds the pose, as it should: so a few attempts.
-  double reached = 0.0;
-  for (int attempt = 0; attempt < 5 && std::abs(reached - 20.0) > 0.01; ++attempt)
-  {
-    Hardware hardware(R"({"pieces":[{"seconds":0.3},{"seconds":1,"wire_mm":20,"pedals":["cine"]}],
-      "faults":[{"at":0.2,"kind":"garbage","count":300},{"at":0.4,"kind":"duplicate","count":5},
-                {"at":0.6,"kind":"reorder","count":3}]})");
-    hardware.byteByByte = true;
-    Loop loop(std::make_shared<SerialDevice>(hardware.Path()));
-    ASSERT_TRUE(loop.Reaches(DeviceState::Running));
-    loop.Until([&] { return loop.input.pedals == CinePedal; });
-    loop.Until([&] { return loop.input.drive.wirePosition >= 19.99; }, 2.0);
-    loop.Run(0.2);
-    reached = loop.input.drive.wirePosition;
-    EXPECT_LT(reached, 20.01);
-    EXPECT_EQ(loop.input.pedals, 0U);
-  }
-  EXPECT_NEAR(reached, 20.0, 0.01);
+  Hardware hardware(R"({"pieces":[{"seconds":0.3},{"seconds":1,"wire_mm":20,"pedals":["cine"]}],
+    "faults":[{"at":0.2,"kind":"garbage","count":300},{"at":0.4,"kind":"duplicate","count":5},
+              {"at":0.6,"kind":"reorder","count":3}]})");
+  hardware.byteByByte = true;
+  Loop loop(std::make_shared<SerialDevice>(hardware.Path()));
+  ASSERT_TRUE(loop.Reaches(DeviceState::Running));
+  loop.Until([&] { return loop.input.pedals == CinePedal; });
+  loop.Until([&] { return loop.input.drive.wirePosition >= 19.99; }, 2.0);
+  loop.Run(0.2);
+  EXPECT_NEAR(loop.input.drive.wirePosition, 20.0, 0.01);
+  EXPECT_EQ(loop.input.pedals, 0U);
 }
 
 TEST(SerialDevice, PulledOutAndBack)
@@ -364,9 +357,8 @@ TEST(SerialDevice, WatchdogsInRealTime)
   Loop loop(std::make_shared<SerialDevice>(hardware.Path()));
   loop.force.wireForce = 1.0;
   ASSERT_TRUE(loop.Reaches(DeviceState::Running));
-  double best = 1.0;
-  double bestLoose = 1.0;
-  // A machine that is busy makes it late: what counts is the best of a few.
+  std::vector<double> relaxed;
+  std::vector<double> loose;
   for (int round = 0; round < 5; ++round)
   {
     loop.beats = true;
@@ -375,12 +367,16 @@ TEST(SerialDevice, WatchdogsInRealTime)
     loop.beats = false;
     const std::uint64_t quiet = Microseconds();
     loop.Until([&] { return hardware.relaxed && hardware.motor == 0.0; }, 1.0);
-    best = std::min(best, 1e-6 * static_cast<double>(hardware.relaxedAt - quiet));
-    bestLoose = std::min(bestLoose, 1e-6 * static_cast<double>(hardware.looseAt - quiet));
+    relaxed.push_back(1e-6 * static_cast<double>(hardware.relaxedAt - quiet));
+    loose.push_back(1e-6 * static_cast<double>(hardware.looseAt - quiet));
   }
-  std::printf("relaxes after %.1f ms, loose after %.1f ms\n", 1e3 * best, 1e3 * bestLoose);
-  EXPECT_NEAR(best, 0.020, 0.005);
-  EXPECT_LE(bestLoose, 0.075);
+  std::sort(relaxed.begin(), relaxed.end());
+  std::sort(loose.begin(), loose.end());
+  std::printf("relaxes after %.1f to %.1f ms, loose after %.1f to %.1f ms\n", 1e3 * relaxed.front(),
+    1e3 * relaxed.back(), 1e3 * loose.front(), 1e3 * loose.back());
+  EXPECT_GE(relaxed.front(), 0.015);
+  EXPECT_LE(relaxed.back(), 0.025);
+  EXPECT_LE(loose.back(), 0.075);
 }
 
 namespace
@@ -416,16 +412,11 @@ TEST(SerialDevice, AThousandStatesASecond)
   Loop loop(std::make_shared<SerialDevice>(hardware.Path()));
   ASSERT_TRUE(loop.Reaches(DeviceState::Running));
   loop.Run(0.5); // the clocks come to know each other
-  double p99 = 1.0;
-  // Others may be busy on the machine.
-  for (int attempt = 0; attempt < 3 && p99 >= 0.002; ++attempt)
-  {
-    const std::vector<double> latencies = Latencies(loop);
-    ASSERT_GT(latencies.size(), 100U);
-    p99 = latencies[latencies.size() * 99 / 100];
-    std::printf(", from hand to simulator: median %.3f ms, 99 %% %.3f ms, most %.3f ms\n",
-      1e3 * latencies[latencies.size() / 2], 1e3 * p99, 1e3 * latencies.back());
-  }
+  const std::vector<double> latencies = Latencies(loop);
+  ASSERT_GT(latencies.size(), 100U);
+  const double p99 = latencies[latencies.size() * 99 / 100];
+  std::printf(", from hand to simulator: median %.3f ms, 99 %% %.3f ms, most %.3f ms\n",
+    1e3 * latencies[latencies.size() / 2], 1e3 * p99, 1e3 * latencies.back());
   EXPECT_LT(p99, 0.002);
   EXPECT_EQ(loop.device->Status().glitches, 0U);
 }

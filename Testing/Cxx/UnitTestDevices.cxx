@@ -375,6 +375,32 @@ TEST(SerialDevice, DisturbedLine)
   EXPECT_EQ(bench.maximumStep, 0.0);
 }
 
+TEST(SerialDevice, DrivesByTornFramesAndJunk)
+{
+  VirtualBench bench;
+  bench.line.most = 61; // frames come in pieces
+  bench.Run(0.1);
+  ASSERT_EQ(bench.State(), DeviceState::Running);
+  RandomStream random(7);
+  int junk = 0;
+  bench.atTick = [&]
+  {
+    bench.Place(AxisKind::WireAdvance) += 0.01;
+    // Between frames, and without the byte that ends one: the next one is lost with it.
+    for (int n = bench.tick % 200 == 0 ? 40 : 0; n > 0; --n, ++junk)
+    {
+      bench.line.toHost.push_back(static_cast<std::uint8_t>((random.Bits() & 0xFFU) | 1U));
+    }
+  };
+  bench.Run(1.0);
+  bench.atTick = nullptr;
+  bench.Run(0.05);
+  EXPECT_EQ(junk, 400);
+  EXPECT_EQ(bench.State(), DeviceState::Running);
+  EXPECT_NEAR(bench.frame.input.drive.wirePosition, 20.0, 0.006);
+  EXPECT_LT(bench.maximumStep, 0.1);
+}
+
 TEST(SerialDevice, LostRepeatedAndReorderedStatesLoseNothing)
 {
   VirtualBench bench;

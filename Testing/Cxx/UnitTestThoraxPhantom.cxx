@@ -7,9 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <limits>
 #include <string>
 #include <vector>
@@ -76,15 +76,20 @@ double LineIntegral(
 }
 }
 
-TEST(ThoraxPhantom, isThereInTwoSecondsAndAlwaysTheSame)
+TEST(ThoraxPhantom, IsThereInTwoSecondsOfTwoCores)
 {
-  const auto start = std::chrono::steady_clock::now();
+  const std::clock_t start = std::clock(); // of all threads
+  const HounsfieldVolume made = MakeThoraxPhantom();
+  const double seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+  const std::array<int, 3> n = made.View().Dimensions();
+  std::printf("| thorax of %d x %d x %d voxels: processor s | | %.2f | | below 4 |\n", n[0], n[1],
+    n[2], seconds);
+  EXPECT_LT(seconds, 4.0);
+}
+
+TEST(ThoraxPhantom, IsAlwaysTheSame)
+{
   const HounsfieldVolume& volume = Thorax();
-  const double seconds =
-    std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  const std::array<int, 3> n = volume.View().Dimensions();
-  std::printf("| thorax of %d x %d x %d voxels: s | | %.2f | | (2 when the machine is free) |\n",
-    n[0], n[1], n[2], seconds);
   ASSERT_EQ(volume.values.size(), static_cast<std::size_t>(volume.View().NumberOfVoxels()));
 
   ThoraxSettings coarse;

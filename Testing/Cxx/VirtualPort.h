@@ -28,9 +28,10 @@ struct VirtualLine
   coronary::EmulatedDevice device;
   std::uint64_t now = 1000000; ///< microseconds
   coronary::PortOpening opening = coronary::PortOpening::Open;
-  bool gone = false;   ///< reads and writes fail
-  bool silent = false; ///< nothing comes from the device
-  bool deaf = false;   ///< nothing reaches the device
+  bool gone = false;       ///< reads and writes fail
+  bool silent = false;     ///< nothing comes from the device
+  bool deaf = false;       ///< nothing reaches the device
+  std::size_t most = 4096; ///< bytes that one reading gets
   bool open = false;
   int openings = 0;
   std::vector<std::uint8_t> toHost;
@@ -84,7 +85,7 @@ public:
       return -1;
     }
     std::vector<std::uint8_t>& from = this->Line.toHost;
-    const std::size_t size = std::min(most, from.size());
+    const std::size_t size = std::min({ most, from.size(), this->Line.most });
     std::copy_n(from.begin(), size, bytes);
     from.erase(from.begin(), from.begin() + static_cast<std::ptrdiff_t>(size));
     return static_cast<int>(size);

@@ -1,6 +1,6 @@
 """SIGKILL while a model is made, measured and written out, and while a session is recorded.
 
-Usage: test_hostile_kills.py --pipeline PROGRAM --simulator PROGRAM --driving SCRIPT [--preload LIBRARY]
+Usage: test_hostile_kills.py --pipeline PROGRAM --simulator PROGRAM --driving SCRIPT [--preload LIBRARY] [--one]
 
 Killed some time after the start and, with the library (KillBeforeChange.cxx), between any two files of a set: every
 file that has its final name is a whole old or a whole new one, the file that describes the others stands only beside
@@ -149,12 +149,19 @@ def check_session(kills, simulator, work, driving, model):
     kills.check(folder, command(1500), command(4000), (0.8,), ("tip.csv", "a.pcirec"), whole)
 
 
+def finish(failures, began):
+    """Says how it went; the exit code."""
+    print(f"hostile kills: {failures.count} failed, {time.monotonic() - began:.1f} s")
+    return 1 if failures.count else 0
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pipeline", required=True)
     parser.add_argument("--simulator", required=True)
     parser.add_argument("--driving", required=True, help="script for the simulator")
     parser.add_argument("--preload", help="library that kills between files")
+    parser.add_argument("--one", action="store_true", help="one kill of a run only")
     options = parser.parse_args()
     failures = Failures()
     kills = Kills(failures, options.preload)
@@ -177,6 +184,10 @@ def main():
             return pipeline("sequence", model, "--quiet", "--output", work / "meshes", *arguments)
 
         kills.succeed(pipeline(*PHANTOM, "--output", work / "phantom"))
+        if options.one:
+            kills.check(model, None, make("--edges", "1", "2"), () if options.preload else (0.5,), ("motion/volume_01.vtu",),
+                        kills.run_is_whole, ["--resume"])
+            return finish(failures, began)
         kills.check(model, make("--until", "volume", "--edges", "1", "2"), make("--edges", "0.8", "1.6"), (0.5,),
                     ("mask.mha", "motion/volume_01.vtu"), kills.run_is_whole, ["--resume"])
         kills.check(work / "evaluation", measure("--name", "old"), measure("--name", "new"), (0.8,),
@@ -185,8 +196,7 @@ def main():
                     (0.8,), ("walls_combined.vtp", "mesh_volume_002.vtu", "mesh.json"),
                     kills.set_is_whole("mesh.json"))
         check_session(kills, options.simulator, work, options.driving, model)
-    print(f"hostile kills: {failures.count} failed, {time.monotonic() - began:.1f} s")
-    return 1 if failures.count else 0
+    return finish(failures, began)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
-"""The Python examples of README and all reference pages: as they stand there, and once more with another source active
-before every statement, which may change nothing. The plugin is found as README says."""
+"""The Python examples of README and all reference pages: as they stand there, and in ReferenceExamplesDistracted once more
+with another source active before every statement, which may change nothing. The plugin is found as README says."""
 import ast
 import contextlib
 import glob
@@ -12,7 +12,7 @@ from paraview import simple
 
 from coronary_testing import require, write_series, write_tree
 
-folder, sources = sys.argv[1:3]
+folder, sources, test = sys.argv[1:4]
 
 
 def prepare():
@@ -67,5 +67,7 @@ prepare()
 for page, text in examples().items():
     first = printed(page, text)
     print("%s: %s" % (page, " ".join(first.split())), flush=True)
+    if test == "ReferenceExamples":
+        continue
     second = printed(page, distracted(text))
     require(first == second, "%s prints %r, with other sources active %r" % (page, first, second))
