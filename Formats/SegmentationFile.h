@@ -86,6 +86,23 @@ private:
   std::vector<Segment> List;
   std::vector<std::string> Notices;
 };
+
+/// What a segment is called and looks like in 3D Slicer.
+struct SegmentLook
+{
+  std::string name;
+  std::array<double, 3> color{ 0.85, 0.30, 0.25 };
+  std::string
+    terminology; ///< SNOMED CT type of an anatomical structure, "41801008^Coronary artery"; empty: none
+};
+
+/**
+ * Writes a mask as a .seg.nrrd of one segment, `Segment_1`, with the value 1; gzip; atomically.
+ * @throws std::invalid_argument: voxels that are not those of the grid, a name of several lines; std::runtime_error naming
+ *   `path`
+ */
+void WriteSegmentation(
+  const std::string& path, const SegmentationMask& mask, const SegmentLook& look);
 }
 
 #endif

@@ -1,5 +1,5 @@
 # Package files: find_package(DynamicCoronary) gives DynamicCoronary::Algorithms and
-# DynamicCoronary::Formats (no VTK), and one target per VTK module.
+# DynamicCoronary::Formats (no VTK), DynamicCoronary::Vessels, and one target per VTK module.
 include(CMakePackageConfigHelpers)
 
 set(package_destination "${CMAKE_INSTALL_LIBDIR}/cmake/DynamicCoronary")
@@ -11,6 +11,11 @@ install(EXPORT DynamicCoronaryLibraries
 export(EXPORT DynamicCoronaryLibraries
   NAMESPACE DynamicCoronary::
   FILE "${CMAKE_BINARY_DIR}/${package_destination}/DynamicCoronaryLibraries-targets.cmake")
+# On top of the VTK modules.
+install(EXPORT DynamicCoronaryVessels
+  NAMESPACE DynamicCoronary::
+  FILE DynamicCoronaryVessels-targets.cmake
+  DESTINATION "${package_destination}")
 
 # What our modules need of VTK, in find_package's words.
 set(dynamiccoronary_vtk_components ${required_modules})

@@ -388,7 +388,7 @@ class Pages:
     @staticmethod
     def where(header, proxies):
         """How the class is reached."""
-        rows = ["| in | as |", "|---|---|", "| C++ | `#include <%s.h>`, module `%s` |" % (
+        rows = ["| in | as |", "|---|---|", "| C++ | `#include <DynamicCoronary/%s.h>`, module `%s` |" % (
             header.name, "DynamicCoronary::Coronary" + header.folder.split("/")[-1])]
         for proxy in proxies:
             if proxy.group == "writers":

@@ -61,6 +61,7 @@ vtkStandardNewMacro(vtkMessageTrap::Window);
 
 vtkMessageTrap::vtkMessageTrap()
   : Previous(vtkOutputWindow::GetInstance())
+  , Verbosity(vtkLogger::GetCurrentVerbosityCutoff())
 {
   vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_OFF);
   vtkOutputWindow::SetInstance(this->Trap);
@@ -69,6 +70,7 @@ vtkMessageTrap::vtkMessageTrap()
 vtkMessageTrap::~vtkMessageTrap()
 {
   vtkOutputWindow::SetInstance(this->Previous);
+  vtkLogger::SetStderrVerbosity(static_cast<vtkLogger::Verbosity>(this->Verbosity));
 }
 
 void vtkMessageTrap::PrintWarnings()

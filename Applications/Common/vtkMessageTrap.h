@@ -39,6 +39,7 @@ private:
   class Window;
   vtkNew<Window> Trap;
   vtkSmartPointer<vtkOutputWindow> Previous;
+  int Verbosity;
 };
 
 /**

@@ -7,6 +7,7 @@
 #include "MovingModel.h"
 #include "OptionChecks.h"
 #include "ProgressDisplay.h"
+#include "SegmentationFile.h"
 #include "SlicerScene.h"
 #include "StagedFolder.h"
 #include "vtkDataFiles.h"
@@ -69,7 +70,10 @@ private:
     const SequenceIndex& index, Step& step) const;
   SlicerSequence WriteImages(
     vtkGatedImageReader* reader, const SequenceIndex& index, Step& step) const;
-  std::string WritePoints(Step& step) const;
+  SlicerSequence WriteTransforms(
+    const std::vector<TimedFile>& centerlines, const SequenceIndex& index, Step& step) const;
+  SlicerStill WriteStill(Step& step) const;
+  std::string FileOf(const char* name) const;
 };
 
 void SlicerJob::Declare(CLI::App& app)
@@ -206,28 +210,79 @@ SlicerSequence SlicerJob::WriteImages(
   return sequence;
 }
 
-std::string SlicerJob::WritePoints(Step& step) const
+/// In the folder of the result; empty: it is not there.
+std::string SlicerJob::FileOf(const char* name) const
 {
-  const auto there = [&](const char* name)
+  std::error_code error;
+  const fs::path path = fs::path(this->result) / name;
+  return fs::is_regular_file(path, error) ? path.string() : std::string();
+}
+
+std::vector<Vector3> PointsOf(vtkPolyData* data)
+{
+  std::vector<Vector3> points;
+  for (vtkIdType n = 0; n < data->GetNumberOfPoints(); ++n)
   {
-    std::error_code error;
-    const fs::path path = fs::path(this->result) / name;
-    return fs::is_regular_file(path, error) ? path.string() : std::string();
-  };
-  const std::string tree = there("centerline.vtp");
+    points.emplace_back(data->GetPoint(n));
+  }
+  return points;
+}
+
+/// The motion of the whole tree from where the mask is, so that others can be moved with it.
+SlicerSequence SlicerJob::WriteTransforms(
+  const std::vector<TimedFile>& centerlines, const SequenceIndex& index, Step& step) const
+{
+  SlicerSequence sequence;
+  sequence.name = "Heart motion (affine)";
+  sequence.file = "transform.seq.mrml";
+  std::vector<Vector3> rest;
+  const std::string tree = this->FileOf("centerline.vtp");
+  if (!tree.empty())
+  {
+    rest = PointsOf(ReadPolyData(tree, step.messages));
+  }
+  for (const TimedFile& file : centerlines)
+  {
+    const std::vector<Vector3> now = PointsOf(ReadPolyData(file.path, step.messages));
+    if (rest.size() != now.size())
+    {
+      if (!sequence.transforms.empty() || now.empty())
+      {
+        throw std::runtime_error(
+          "'" + file.path + "' has other points than the centerlines of the first moment.");
+      }
+      rest = now; // not a result of run: from the first moment on
+    }
+    sequence.transforms.push_back(FitAffineMotion(rest, now));
+  }
+  WriteFileAtomically(step.folder.Add(sequence.file), SequenceSceneText(sequence, index));
+  return sequence;
+}
+
+SlicerStill SlicerJob::WriteStill(Step& step) const
+{
+  SlicerStill still;
+  const std::string mask = this->FileOf("mask.mha");
+  if (!mask.empty())
+  {
+    still.segmentation = "mask.seg.nrrd";
+    WriteSegmentation(step.folder.Add(still.segmentation), SegmentationFile(mask).Mask({}),
+      { "Coronary arteries", { 0.85, 0.30, 0.25 }, "41801008^Coronary artery" });
+  }
+  const std::string tree = this->FileOf("centerline.vtp");
   if (!tree.empty())
   {
     WriteFileAtomically(step.folder.Add("centerline.mrk.json"),
       MarkupsText(CurvesOf(ReadPolyData(tree, step.messages))));
   }
-  const std::string ostia = there("ostia.vtp");
-  if (ostia.empty())
+  const std::string ostia = this->FileOf("ostia.vtp");
+  if (!ostia.empty())
   {
-    return {};
+    still.points = "ostia.mrk.json";
+    WriteFileAtomically(step.folder.Add(still.points),
+      MarkupsText(FiducialsOf(ReadPolyData(ostia, step.messages), "Ostia")));
   }
-  WriteFileAtomically(step.folder.Add("ostia.mrk.json"),
-    MarkupsText(FiducialsOf(ReadPolyData(ostia, step.messages), "Ostia")));
-  return "ostia.mrk.json";
+  return still;
 }
 
 void SlicerJob::Run() const
@@ -259,6 +314,7 @@ void SlicerJob::Run() const
   }
   const SequenceIndex index = this->IndexOf(model, reader, messages);
   StagedFolder folder(this->output);
+  double left = -1.0; // mm, of the affine motion
   const std::size_t steps =
     model.surfaces.size() + model.centerlines.size() + (reader ? model.surfaces.size() : 0);
   try
@@ -276,13 +332,18 @@ void SlicerJob::Run() const
       sequences.back().opacity = 0.6;
       sequences.push_back(this->WriteModels(model.centerlines, "Centerlines", index, step));
       sequences.back().color = { 0.95, 0.85, 0.20 };
+      sequences.push_back(this->WriteTransforms(model.centerlines, index, step));
+      for (const AffineMotion& motion : sequences.back().transforms)
+      {
+        left = std::max(left, motion.left);
+      }
     }
     if (reader)
     {
       sequences.push_back(this->WriteImages(reader, index, step));
     }
-    const std::string points = this->WritePoints(step);
-    WriteFileAtomically(folder.Add("scene.mrml"), SlicerSceneText(sequences, index, points, 1.0));
+    const SlicerStill still = this->WriteStill(step);
+    WriteFileAtomically(folder.Add("scene.mrml"), SlicerSceneText(sequences, index, still, 1.0));
     ThrowIfInterrupted();
   }
   catch (const std::runtime_error& error)
@@ -296,6 +357,12 @@ void SlicerJob::Run() const
   {
     std::printf("%s/scene.mrml: %zu moments, %g to %g ms\n", this->output.c_str(),
       index.values.size(), index.values.front(), index.values.back());
+    if (left >= 0.0)
+    {
+      std::printf(
+        "The affine motion leaves up to %.2g mm of the tree's (root mean square of a moment)\n",
+        left);
+    }
   }
 }
 }
@@ -305,8 +372,9 @@ Command MakeSlicerCommand(CLI::App& program)
   CLI::App* app = program.add_subcommand(
     "slicer", "A moving model and its images as sequences in a scene of 3D Slicer");
   app->footer("Writes DIR/scene.mrml, wall.seq.mrml with wall/, and where there are any "
-              "centerlines.seq.mrml with centerlines/, centerline.mrk.json, ostia.mrk.json, "
-              "image.seq.nrrd.");
+              "centerlines.seq.mrml with centerlines/, transform.seq.mrml, centerline.mrk.json, "
+              "ostia.mrk.json, "
+              "mask.seg.nrrd, image.seq.nrrd.");
   auto job = std::make_shared<SlicerJob>();
   job->Declare(*app);
   return { app, [job] { job->Run(); } };

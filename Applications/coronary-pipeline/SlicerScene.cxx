@@ -3,7 +3,10 @@
 #include "TextWords.h"
 #include "XmlText.h"
 
+#include <Eigen/Eigenvalues>
+
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 namespace coronary
@@ -91,9 +94,37 @@ std::string Model(std::size_t number, const std::string& name, const std::string
       Attribute("references", "display:" + display + ";storage:" + storage + ";"));
 }
 
+/// What transforms a node is hung under it with. Slicer's own world is RAS.
+std::string Transform(std::size_t number, const std::string& name, const AffineMotion& motion)
+{
+  const Vector3 flip(-1.0, -1.0, 1.0);
+  std::string matrix;
+  for (int row = 0; row < 3; ++row)
+  {
+    for (int column = 0; column < 3; ++column)
+    {
+      matrix += Number(flip[row] * motion.matrix(row, column) * flip[column]) + " ";
+    }
+    matrix += Number(flip[row] * motion.shift[row]) + " ";
+  }
+  return Node("LinearTransform", IdOf("LinearTransform", number), name,
+    Attribute("matrixTransformToParent", matrix + "0 0 0 1"));
+}
+
+std::string KindOf(const SlicerSequence& sequence)
+{
+  return sequence.IsTransform() ? "LinearTransform"
+    : sequence.IsVolume()       ? "ScalarVolume"
+                                : "Model";
+}
+
 /// What the browser copies the chosen item into.
 std::string Shown(std::size_t number, const SlicerSequence& sequence, const std::string& folder)
 {
+  if (sequence.IsTransform())
+  {
+    return Transform(number, sequence.name, sequence.transforms.front());
+  }
   if (!sequence.IsVolume())
   {
     return Model(number, sequence.name, folder + sequence.items.front(), sequence);
@@ -114,38 +145,88 @@ std::string FolderOf(const std::string& file)
   return slash == std::string::npos ? std::string() : file.substr(0, slash + 1);
 }
 
-std::string IndexValues(const SequenceIndex& index)
+std::string IndexValues(const std::string& kind, const SequenceIndex& index)
 {
   std::string values;
   for (std::size_t n = 0; n < index.values.size(); ++n)
   {
-    values += (n > 0 ? ";" : "") + IdOf("Model", n + 1) + ":" + Number(index.values[n]);
+    values += (n > 0 ? ";" : "") + IdOf(kind, n + 1) + ":" + Number(index.values[n]);
   }
   return Attribute("indexValues", values);
 }
 }
 
+AffineMotion FitAffineMotion(const std::vector<Vector3>& rest, const std::vector<Vector3>& now)
+{
+  if (rest.empty() || rest.size() != now.size())
+  {
+    throw std::invalid_argument("A motion of " + std::to_string(rest.size()) + " points to " +
+      std::to_string(now.size()) + " can not be fitted");
+  }
+  const auto count = static_cast<double>(rest.size());
+  Vector3 middle = Vector3::Zero();
+  Vector3 moved = Vector3::Zero();
+  for (std::size_t n = 0; n < rest.size(); ++n)
+  {
+    middle += rest[n] / count;
+    moved += now[n] / count;
+  }
+  Matrix3 spread = Matrix3::Zero();
+  Matrix3 change = Matrix3::Zero(); // of displacements with places
+  for (std::size_t n = 0; n < rest.size(); ++n)
+  {
+    const Vector3 place = rest[n] - middle;
+    spread += place * place.transpose();
+    change += (now[n] - moved - place) * place.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix3> solver(spread);
+  Matrix3 inverse = Matrix3::Zero();
+  for (int k = 0; k < 3; ++k)
+  {
+    const double value = solver.eigenvalues()[k];
+    if (value > 1e-6 * solver.eigenvalues()[2] && value > 0.0)
+    {
+      const Vector3 direction = solver.eigenvectors().col(k);
+      inverse += direction * direction.transpose() / value;
+    }
+  }
+  AffineMotion motion;
+  motion.matrix += change * inverse;
+  motion.shift = moved - motion.matrix * middle;
+  double sum = 0.0;
+  for (std::size_t n = 0; n < rest.size(); ++n)
+  {
+    sum += (motion.matrix * rest[n] + motion.shift - now[n]).squaredNorm();
+  }
+  motion.left = std::sqrt(sum / count);
+  return motion;
+}
+
 std::string SequenceSceneText(const SlicerSequence& sequence, const SequenceIndex& index)
 {
-  if (sequence.items.size() != index.values.size())
+  const std::size_t size =
+    sequence.IsTransform() ? sequence.transforms.size() : sequence.items.size();
+  if (size != index.values.size())
   {
-    throw std::invalid_argument("The sequence '" + sequence.name + "' has " +
-      std::to_string(sequence.items.size()) + " items and " + std::to_string(index.values.size()) +
-      " index values");
+    throw std::invalid_argument("The sequence '" + sequence.name + "' has " + std::to_string(size) +
+      " items and " + std::to_string(index.values.size()) + " index values");
   }
   std::string text = Begin;
-  for (std::size_t n = 0; n < sequence.items.size(); ++n)
+  for (std::size_t n = 0; n < size; ++n)
   {
-    text += Model(n + 1, sequence.name + " " + std::to_string(n), sequence.items[n], sequence);
+    const std::string name = sequence.name + " " + std::to_string(n);
+    text += sequence.IsTransform() ? Transform(n + 1, name, sequence.transforms[n])
+                                   : Model(n + 1, name, sequence.items[n], sequence);
   }
   // By this node, alone in its scene, Slicer knows which data node is which moment.
   text += Node("Sequence", "vtkMRMLSequenceNodeSequenceIndex", sequence.name,
-    Attribute("singletonTag", "SequenceIndex") + IndexAttributes(index) + IndexValues(index));
+    Attribute("singletonTag", "SequenceIndex") + IndexAttributes(index) +
+      IndexValues(KindOf(sequence), index));
   return text + "</MRML>\n";
 }
 
 std::string SlicerSceneText(const std::vector<SlicerSequence>& sequences,
-  const SequenceIndex& index, const std::string& points, double perCycle)
+  const SequenceIndex& index, const SlicerStill& still, double perCycle)
 {
   std::string text = Begin;
   std::string postfixes;
@@ -161,7 +242,8 @@ std::string SlicerSceneText(const std::vector<SlicerSequence>& sequences,
     text += Node(storageKind, storage, "",
       Attribute("hideFromEditors", "true") + Attribute("fileName", AsAddress(sequence.file)));
     text += Node("Sequence", IdOf("Sequence", number), sequence.name + " sequence",
-      IndexAttributes(index) + (sequence.IsVolume() ? std::string() : IndexValues(index)) +
+      IndexAttributes(index) +
+        (sequence.IsVolume() ? std::string() : IndexValues(KindOf(sequence), index)) +
         Attribute("references", "storage:" + storage + ";"));
     text += Shown(number, sequence, FolderOf(sequence.file));
     const std::string postfix = "_" + std::to_string(n);
@@ -171,7 +253,7 @@ std::string SlicerSceneText(const std::vector<SlicerSequence>& sequences,
       "createFromPrevious ");
     references.append("sequenceNodeRef").append(postfix).append(":");
     references.append(IdOf("Sequence", number)).append(";dataNodeRef").append(postfix).append(":");
-    references.append(IdOf(sequence.IsVolume() ? "ScalarVolume" : "Model", number)).append(";");
+    references.append(IdOf(KindOf(sequence), number)).append(";");
   }
   const double rate = std::max(1.0, static_cast<double>(index.values.size()) / perCycle);
   text += Node("SequenceBrowser", IdOf("SequenceBrowser", 1), "Heart cycle",
@@ -183,10 +265,23 @@ std::string SlicerSceneText(const std::vector<SlicerSequence>& sequences,
       Attribute("indexDisplayMode", "[indexValue]") + Attribute("indexDisplayFormat", "%.1f") +
       Attribute("virtualNodePostfixes", postfixes) + synchronization +
       Attribute("references", references));
-  if (!points.empty())
+  if (!still.segmentation.empty())
+  {
+    const std::string storage = IdOf("SegmentationStorage", 1);
+    const std::string display = IdOf("SegmentationDisplay", 1);
+    text += Node("SegmentationStorage", storage, "",
+      Attribute("hideFromEditors", "true") + Attribute("fileName", AsAddress(still.segmentation)));
+    // Beside a wall that moves it is seen in the slices only, until the user wants it.
+    text += Node("SegmentationDisplay", display, "",
+      Attribute("hideFromEditors", "true") + Attribute("visibility", "true") +
+        Attribute("visibility2D", "true") + Attribute("visibility3D", "false"));
+    text += Node("Segmentation", IdOf("Segmentation", 1), "Coronary arteries",
+      Attribute("references", "display:" + display + ";storage:" + storage + ";"));
+  }
+  if (!still.points.empty())
   {
     text += Node("MarkupsJsonStorage", IdOf("MarkupsJsonStorage", 1), "",
-      Attribute("hideFromEditors", "true") + Attribute("fileName", AsAddress(points)) +
+      Attribute("hideFromEditors", "true") + Attribute("fileName", AsAddress(still.points)) +
         Attribute("coordinateSystem", "LPS"));
     text += Node("MarkupsFiducialDisplay", IdOf("MarkupsFiducialDisplay", 1), "",
       Attribute("hideFromEditors", "true") + Attribute("visibility", "true"));

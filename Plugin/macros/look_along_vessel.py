@@ -4,8 +4,8 @@ From the menu (Dynamic Coronary, Look Along the Vessel): select an image or a ga
 pipeline browser, or have the result of Build from 4D CT there. From Python: `import look_along_vessel;
 look_along_vessel.look(image, tree, vessel="LAD")`.
 
-Makes a layout of four views: the tree with the sheet and the cross-section, the flat reformat, the flat cross-section, and
-a chart of the diameter. Another vessel is the property Vessel, another place Position of "Along the vessel". Needs the
+Makes a layout: the tree with the sheet and the cross-section, the flat reformat, the flat cross-section, a chart of the
+diameter, its map of place and phase where there are several phases, and the table of lesions. Another vessel is the property Vessel, another place Position of "Along the vessel". Needs the
 DynamicCoronary plugin.
 """
 from paraview import servermanager, simple
@@ -15,6 +15,7 @@ import coronary_views as views
 # Lines on grey pictures; the review page has the same.
 OUTLINES = (("Axis", [0.60, 0.62, 0.66]), ("Lumen", [0.31, 0.84, 1.00]), ("Edge", [0.95, 0.95, 0.95]),
             ("Outer Boundary", [0.77, 0.55, 1.00]), ("Place", [1.00, 0.38, 0.38]))
+MAP_ASPECT = 0.35  # height over width of the map
 HOUNSFIELD = (-150.0, 650.0)
 REFORMAT, SECTION, IN_PLACE = range(3)
 PROFILE, MAP, LESIONS, TREE = range(4)
@@ -32,7 +33,7 @@ def look(image, tree, vessel="", wall=None, size=None):
     size     width and height of all views together, pixels; None: as large as the window
 
     Returns a dictionary with `reformat` (CurvedReformat), `cycle` (LumenCycle), `views` (place, reformat, section,
-    chart) and `layout`. Raises RuntimeError without the plugin, or when the tree does not have the vessel.
+    chart), `map` (None for a tree that stands still), `lesions` and `layout`. Raises RuntimeError without the plugin, or when the tree does not have the vessel.
     """
     views.require_plugin()
     times = views.times_of(image)
@@ -53,7 +54,16 @@ def look(image, tree, vessel="", wall=None, size=None):
     flat, cell = views.split(layout, 0, 0.4)
     section, cell = views.split(layout, cell, 0.35, downwards=True)
     chart = simple.CreateView("XYChartView")
-    simple.AssignViewToLayout(chart, layout, layout.SplitHorizontal(cell, 0.4) + 1)
+    cell = layout.SplitHorizontal(cell, 0.3) + 1
+    simple.AssignViewToLayout(chart, layout, cell)
+    cycle.UpdatePipeline(scene.AnimationTime)
+    phases = cycle.GetDataInformation(MAP).GetBounds()[2:4]
+    moving = phases[0] < phases[1]
+    sheet = None
+    if moving:
+        sheet, cell = views.split(layout, cell, 0.5, downwards=True)
+    table = simple.CreateView("SpreadSheetView")
+    simple.AssignViewToLayout(table, layout, layout.SplitVertical(1, 0.75) + 1)  # below the tree
     if size:
         layout.SetSize(*size)
 
@@ -78,10 +88,14 @@ def look(image, tree, vessel="", wall=None, size=None):
     if len(times) > 1:
         views.note_phase((place,), image)
     chart_profile(cycle, chart)
+    if moving:
+        show_map(cycle, sheet)
+    simple.Show(simple.OutputPort(cycle, LESIONS), table, "SpreadSheetRepresentation")
     simple.SetActiveSource(reformat)
     simple.SetActiveView(place)
-    simple.Render(place)
-    return {"reformat": reformat, "cycle": cycle, "views": (place, flat, section, chart), "layout": layout}
+    simple.RenderAllViews()
+    return {"reformat": reformat, "cycle": cycle, "views": (place, flat, section, chart), "map": sheet, "lesions": table,
+            "layout": layout}
 
 
 def show_port(reformat, port, view, array, window):
@@ -115,6 +129,34 @@ def chart_profile(cycle, view):
     view.LeftAxisTitle = "diameter (mm)"
     view.BottomAxisTitle = "mm from the ostium"
     view.ShowLegend = 1 if len(wanted) <= 12 else 0
+    return shown
+
+
+def show_map(cycle, view):
+    """The diameter by its place (to the right) and phase (upwards), which is stretched to fill the view."""
+    shown = simple.Show(simple.OutputPort(cycle, MAP), view, "GeometryRepresentation")
+    diameter = cycle.GetDataInformation(MAP).GetPointDataInformation().GetArrayInformation("Diameter").GetComponentRange(0)
+    views.colour_by(shown, view, "Diameter", "Diameter (mm)", *diameter)
+    box = cycle.GetDataInformation(MAP).GetBounds()
+    stretch = MAP_ASPECT * (box[1] - box[0]) / max(box[3] - box[2], 1e-6)
+    shown.Scale = [1.0, stretch, 1.0]
+    box = (box[0], box[1], stretch * box[2], stretch * box[3], 0.0, 0.0)
+    views.look_along(view, [0.0, 0.0, -1.0], [0.0, 1.0, 0.0], box, 1.0)
+    view.OrientationAxesVisibility = 0
+    view.InteractionMode = "2D"
+    bar = simple.GetScalarBar(simple.GetColorTransferFunction("Diameter"), view)
+    bar.Orientation, bar.WindowLocation, bar.Position, bar.ScalarBarLength = "Vertical", "Any Location", [0.82, 0.15], 0.6
+    bar.ScalarBarThickness = 8
+    grid = view.AxesGrid
+    grid.AxesToLabel = 3  # below and at the left
+    grid.Visibility, grid.DataScale = 1, [1.0, stretch, 1.0]
+    grid.XTitle, grid.YTitle, grid.ZTitle = "mm from the ostium", "% of R-R", ""
+    for name in ("XTitleColor", "YTitleColor", "XLabelColor", "YLabelColor", "GridColor"):
+        setattr(grid, name, views.BLACK)
+    _fit(view, box)
+    view.CameraParallelScale *= 1.8  # room for titles, and at the right for the legend
+    view.CameraFocalPoint = [view.CameraFocalPoint[0] + 0.1 * (box[1] - box[0]), *view.CameraFocalPoint[1:]]
+    view.CameraPosition = [view.CameraFocalPoint[0], *view.CameraPosition[1:]]
     return shown
 
 

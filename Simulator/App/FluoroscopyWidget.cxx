@@ -80,6 +80,23 @@ void FluoroscopyWidget::SetRunText(const QString& text)
   this->update();
 }
 
+/// What a newcomer has not done yet: pedals first, for without radiation there is no image and no use of contrast medium.
+QString FluoroscopyWidget::Hint() const
+{
+  const SessionMetrics& metrics = this->Now.metrics;
+  if (!this->RunText.isEmpty())
+  {
+    return {};
+  }
+  if (metrics.frames == 0)
+  {
+    return "Hold F for fluoroscopy, C for a cine run\n"
+           "Hold Space to inject contrast medium\n"
+           "Arrow keys move and turn the wire";
+  }
+  return metrics.contrast <= 0.0 ? "Hold Space to inject contrast medium" : QString();
+}
+
 void FluoroscopyWidget::paintEvent(QPaintEvent*)
 {
   QPainter painter(this);
@@ -150,6 +167,15 @@ void FluoroscopyWidget::paintEvent(QPaintEvent*)
   {
     write(Qt::AlignRight | Qt::AlignBottom, 1,
       QString("Refining %1 %").arg(100.0 * this->Completeness, 0, 'f', 0), plain);
+  }
+  const QString hint = this->Hint();
+  if (!hint.isEmpty())
+  {
+    const QRect low = place.adjusted(20, place.height() * 6 / 10, -20, -3 * line);
+    painter.setPen(QColor(0, 0, 0, 180));
+    painter.drawText(low.translated(1, 1), Qt::AlignHCenter | Qt::AlignBottom, hint);
+    painter.setPen(QColor(150, 210, 255));
+    painter.drawText(low, Qt::AlignHCenter | Qt::AlignBottom, hint);
   }
   if (!this->Banner.isEmpty())
   {

@@ -44,6 +44,8 @@ protected:
   void mouseMoveEvent(QMouseEvent* event) override;
 
 private:
+  QString Hint() const;
+
   QImage Image;
   SessionSnapshot Now;
   double Completeness = 1.0;

@@ -5,33 +5,37 @@
 #ifndef DynamicCoronary_SessionWorld_h
 #define DynamicCoronary_SessionWorld_h
 
+#include "PatientHeart.h"
 #include "Scenario.h"
 #include "VolumeProjector.h"
 #include "WallMotion.h"
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 namespace coronary
 {
-class ProgressDisplay;
-
 struct SessionWorld
 {
   Scenario scenario; ///< with the isocentre that the C-arm starts at
   std::shared_ptr<WallMotion> wall;
   std::uint64_t wallHash = 0;
+  std::shared_ptr<const PatientHeart> heart;         ///< null: not known
   std::shared_ptr<const VolumeProjector> background; ///< null: not asked for
   std::string motion;                                ///< for people: "tracked at 20 moments"
   std::vector<std::string> notes;                    ///< what was assumed, a sentence each
   std::string foreignMotion; ///< what of the motion is not the patient's; empty: nothing
 };
 
-/// @param progress  gets the steps "vessels" and, with the background, "patient", in either order; numbers from 0 on
+/// Gets what is being made, "vessels" and, with the background, "patient", in either order, and how much of it, 0 to 1.
+/// @return false: cancel
+using WorldProgress = std::function<bool(const std::string& what, double fraction)>;
+
 /// @throws as LoadVessels, LoadBackground; Cancelled
-SessionWorld LoadWorld(const Scenario& scenario, bool background, ProgressDisplay& progress);
+SessionWorld LoadWorld(const Scenario& scenario, bool background, const WorldProgress& progress);
 }
 
 #endif

@@ -8,6 +8,7 @@
 #include "SessionEngine.h"
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -36,11 +37,17 @@ struct WindowOptions
 /// @throws UsageError: no such kind of device; std::runtime_error: no display, no place for a file
 void CheckWindow(const WindowOptions& options);
 
+/// Makes what the sessions share, on a thread beside the window.
+using WorldLoader = std::function<SessionWorld(const WorldProgress& progress)>;
+
 /**
- * Returns when the window has been closed. Needs a display with OpenGL 3.2.
- * @throws std::runtime_error: no OpenGL; what went wrong in the sessions, the first; devices, files as SessionEngine
+ * The window is there at once and says how far the loader is. Returns when it has been closed. Needs a display with
+ * OpenGL 3.2.
+ * @param scenario  that the loader makes the world of, for the title
+ * @throws what the loader throws; Cancelled: interrupted; std::runtime_error: no OpenGL; what went wrong in the sessions, the
+ * first; devices, files as SessionEngine
  */
-void RunWindow(const SessionWorld& world, const WindowOptions& options);
+void RunWindow(const Scenario& scenario, const WorldLoader& load, const WindowOptions& options);
 }
 
 #endif

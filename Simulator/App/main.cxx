@@ -9,7 +9,6 @@
 #include "OptionChecks.h"
 #include "ParallelFor.h"
 #include "Program.h"
-#include "ProgressDisplay.h"
 #include "SessionWorld.h"
 #ifdef DYNAMICCORONARY_WITH_WINDOW
 #include "SimulatorWindow.h"
@@ -278,19 +277,6 @@ void Request::RunWindow() const
   options.record = chosen.record;
   options.quiet = chosen.quiet;
   coronary::CheckWindow(options);
-  coronary::SessionWorld world;
-  {
-    coronary::ProgressDisplay progress("step", 2, chosen.quiet);
-    world = coronary::LoadWorld(coronary::ScenarioOf(chosen), true, progress);
-  }
-  if (!chosen.replay.empty())
-  {
-    coronary::CheckRecording(chosen.replay, world.scenario, world.wallHash, true);
-  }
-  for (const std::string& note : world.notes)
-  {
-    std::fprintf(stderr, "Warning: %s\n", note.c_str());
-  }
   if (options.igtlPort > 0 && !coronary::IgtlOutput::IsLocal(options.igtlAddress))
   {
     std::fprintf(stderr,
@@ -299,7 +285,21 @@ void Request::RunWindow() const
       "no authentication.\n",
       options.igtlAddress.c_str());
   }
-  coronary::RunWindow(world, options);
+  const coronary::Scenario scenario = coronary::ScenarioOf(chosen);
+  const auto load = [&](const coronary::WorldProgress& progress)
+  {
+    coronary::SessionWorld world = coronary::LoadWorld(scenario, true, progress);
+    if (!chosen.replay.empty())
+    {
+      coronary::CheckRecording(chosen.replay, world.scenario, world.wallHash, true);
+    }
+    for (const std::string& note : world.notes)
+    {
+      std::fprintf(stderr, "Warning: %s\n", note.c_str());
+    }
+    return world;
+  };
+  coronary::RunWindow(scenario, load, options);
 }
 #endif
 

@@ -627,6 +627,24 @@ private:
 };
 }
 
+namespace
+{
+WorldProgress ShownBy(ProgressDisplay& progress)
+{
+  return
+    [&progress, step = -1, now = std::string()](const std::string& what, double fraction) mutable
+  {
+    if (what != now)
+    {
+      now = what;
+      progress.BeginStep(++step, what);
+    }
+    progress.Update(fraction);
+    return Interruption() == 0;
+  };
+}
+}
+
 void RunHeadless(const HeadlessOptions& options)
 {
   const Scenario scenario = ScenarioOf(options);
@@ -638,7 +656,7 @@ void RunHeadless(const HeadlessOptions& options)
   }
   const int preparations = options.xray ? 2 : 1;
   auto progress = std::make_unique<ProgressDisplay>("step", preparations + 1, options.quiet);
-  const SessionWorld world = LoadWorld(scenario, options.xray, *progress);
+  const SessionWorld world = LoadWorld(scenario, options.xray, ShownBy(*progress));
   if (hands.Recording())
   {
     CheckRecording(options.replay, scenario, world.wallHash, !options.verify);

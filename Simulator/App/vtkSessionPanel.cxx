@@ -220,9 +220,9 @@ QGroupBox* SessionWindow::MakeXRayGroup()
   auto* group = new QGroupBox("X-ray");
   auto* form = new QFormLayout(group);
   auto* row = new QHBoxLayout;
-  this->FluoroscopyButton = Button("Fluoroscopy", "Radiation while it is held; key: see Help");
-  auto* cine = Button("Cine", "A run that is stored, while it is held");
-  auto* mask = Button("Mask", "The next frame becomes the mask of subtraction and roadmap");
+  this->FluoroscopyButton = Button("Fluoroscopy", "Radiation while it is held; key F");
+  auto* cine = Button("Cine", "A run that is stored, while it is held; key C");
+  auto* mask = Button("Mask", "The next frame becomes the mask of subtraction and roadmap; key M");
   row->addWidget(this->FluoroscopyButton);
   row->addWidget(cine);
   row->addWidget(mask);
@@ -302,7 +302,8 @@ QGroupBox* SessionWindow::MakeContrastGroup()
 {
   auto* group = new QGroupBox("Contrast medium");
   auto* form = new QFormLayout(group);
-  auto* inject = Button("Inject", "Pushes the syringe while it is held; key: see Help");
+  auto* inject =
+    Button("Inject (Space)", "Pushes the syringe while it is held, as the key Space does");
   this->InjectionBox = Number(0.5, 10.0, 0.5, 1, "mL/s", "How fast the button pushes");
   this->InjectionBox->setValue(3.0);
   auto* row = new QHBoxLayout;

@@ -61,7 +61,8 @@ SessionPictures::SessionPictures(const PictureOptions& options, const SessionWor
         ". X-ray images need no display; xvfb-run gives one to programs.");
     }
     this->Data->Scene = std::make_unique<vtkSimulatorScene>(*world.wall, scenario,
-      MakeHeartShell(*world.wall, scenario.vessels), SceneSettings{ SceneTriangles });
+      MakeHeartShell(*world.wall, scenario.vessels, world.heart.get()),
+      SceneSettings{ SceneTriangles });
     this->Data->Picture =
       std::make_unique<vtkScenePicture>(*this->Data->Scene, SceneSize, SceneSize);
   }

@@ -40,7 +40,8 @@ namespace coronary
 class SessionWindow : public QMainWindow
 {
 public:
-  SessionWindow(const SessionWorld& world, const WindowOptions& options);
+  SessionWindow(const SessionWorld& world, std::unique_ptr<vtkSimulatorScene> scene,
+    const WindowOptions& options);
   ~SessionWindow() override;
 
   /// @throws as SessionEngine, OpenDevice

@@ -5,7 +5,9 @@
 #include "vtkActor.h"
 #include "vtkCamera.h"
 #include "vtkCellArray.h"
+#include "vtkFloatArray.h"
 #include "vtkLight.h"
+#include "vtkPointData.h"
 #include "vtkPoints.h"
 #include "vtkPolyData.h"
 #include "vtkPolyDataMapper.h"
@@ -15,6 +17,7 @@
 #include "vtkTubeFilter.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace coronary
 {
@@ -110,19 +113,98 @@ void vtkSimulatorScene::MakeWall(WallMotion& wall, std::int64_t triangles)
   const DrawnSurface drawn = MakeDrawnSurface(whole, triangles);
   this->WallMesh->ShallowCopy(drawn.data);
   this->Drawn = drawn.origin;
-  vtkNew<vtkPolyDataNormals> normals;
-  normals->SetInputData(this->WallMesh);
-  normals->SplittingOff();
-  normals->ConsistencyOff();
+  this->AnchorNormals(wall, whole, rest);
   vtkNew<vtkPolyDataMapper> mapper;
-  mapper->SetInputConnection(normals->GetOutputPort());
+  mapper->SetInputData(this->WallMesh);
   Draw(this->Renderer_, this->WallActor, mapper);
   vtkProperty* look = this->WallActor->GetProperty();
   look->SetColor(0.86, 0.24, 0.22);
   look->SetOpacity(0.38);
+  // On few triangles the normals of what is seen edge-on point away, where only ambient light is left.
+  look->SetAmbient(0.45);
+  look->SetDiffuse(0.6);
   look->SetSpecular(0.3);
   look->SetSpecularPower(30.0);
   look->BackfaceCullingOn(); // half of what is translucent, and quicker
+}
+
+/// Rows: away from the axis, along it, around it.
+Matrix3 vtkSimulatorScene::FrameOf(
+  const AxisNormal& anchor, const std::vector<Vector3>& axis, const Vector3& point)
+{
+  Matrix3 frame;
+  const Vector3 along = (axis[anchor.after] - axis[anchor.before]).normalized();
+  Vector3 out = point - axis[anchor.at];
+  out -= out.dot(along) * along;
+  frame.row(0) = out.norm() > 1e-6 ? Vector3(out.normalized()) : along.unitOrthogonal();
+  frame.row(1) = along;
+  frame.row(2) = along.cross(Vector3(frame.row(0)));
+  return frame;
+}
+
+/// The few triangles that are drawn have bad normals of their own, which look like wrinkles and holes: those of the whole
+/// wall are used, and turned with the vessel.
+void vtkSimulatorScene::AnchorNormals(
+  WallMotion& wall, vtkPolyData* whole, const std::vector<Vector3>& rest)
+{
+  vtkNew<vtkPolyDataNormals> normals;
+  normals->SetInputData(whole);
+  normals->SplittingOff();
+  normals->ConsistencyOff();
+  normals->Update();
+  vtkDataArray* values = normals->GetOutput()->GetPointData()->GetNormals();
+
+  const WallTopology& topology = wall.Topology();
+  std::vector<Vector3> axis;
+  wall.AxisPositions(RestPhase, axis);
+  std::vector<std::size_t> begin{ 0 }; // of each branch in the list
+  for (const std::vector<Vector3>& branch : topology.axis)
+  {
+    begin.push_back(begin.back() + branch.size());
+  }
+  std::vector<Vector3> points;
+  for (const std::int64_t id : this->Drawn)
+  {
+    const Vector3& point = rest[static_cast<std::size_t>(id)];
+    const int group = topology.group[static_cast<std::size_t>(id)];
+    const bool known = group >= 0 && static_cast<std::size_t>(group) + 1 < begin.size();
+    AxisNormal anchor;
+    double nearest = std::numeric_limits<double>::max();
+    for (std::size_t b = known ? static_cast<std::size_t>(group) : 0;
+         b + 1 < begin.size() && (!known || b == static_cast<std::size_t>(group)); ++b)
+    {
+      for (std::size_t k = begin[b]; k < begin[b + 1]; ++k)
+      {
+        const double away = (axis[k] - point).squaredNorm();
+        if (away < nearest)
+        {
+          nearest = away;
+          anchor.at = k;
+          anchor.before = k > begin[b] ? k - 1 : k;
+          anchor.after = k + 1 < begin[b + 1] ? k + 1 : k;
+        }
+      }
+    }
+    anchor.normal = FrameOf(anchor, axis, point) * Vector3(values->GetTuple3(id));
+    this->Normals.push_back(anchor);
+    points.push_back(point);
+  }
+  this->WallNormals->SetNumberOfComponents(3);
+  this->WallNormals->SetNumberOfTuples(static_cast<vtkIdType>(points.size()));
+  this->WallMesh->GetPointData()->SetNormals(this->WallNormals);
+  this->TurnNormals(points, axis);
+}
+
+void vtkSimulatorScene::TurnNormals(
+  const std::vector<Vector3>& points, const std::vector<Vector3>& axis)
+{
+  for (std::size_t n = 0; n < this->Normals.size(); ++n)
+  {
+    const AxisNormal& anchor = this->Normals[n];
+    const Vector3 normal = FrameOf(anchor, axis, points[n]).transpose() * anchor.normal;
+    this->WallNormals->SetTuple(static_cast<vtkIdType>(n), normal.data());
+  }
+  this->WallNormals->Modified();
 }
 
 void vtkSimulatorScene::MakeHeart()
@@ -166,6 +248,8 @@ void vtkSimulatorScene::MakeInstruments(const Scenario& scenario)
   make(
     this->CatheterLine, this->CatheterTube, this->CatheterActor, scenario.catheter.outerRadius, 10);
   this->CatheterActor->GetProperty()->SetColor(0.93, 0.8, 0.3);
+  this->CatheterActor->GetProperty()->SetAmbient(0.35);
+  this->CatheterActor->GetProperty()->SetDiffuse(0.7);
 }
 
 void vtkSimulatorScene::MakeTracers()
@@ -190,6 +274,7 @@ void vtkSimulatorScene::Update(const SessionSnapshot& snapshot)
   if (snapshot.wall.size() == this->Drawn.size())
   {
     SetPoints(this->WallMesh, snapshot.wall);
+    this->TurnNormals(snapshot.wall, snapshot.axis);
   }
   if (this->Heart && this->HeartActor->GetVisibility() != 0)
   {

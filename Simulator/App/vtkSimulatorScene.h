@@ -17,6 +17,7 @@
 
 class vtkActor;
 class vtkPoints;
+class vtkFloatArray;
 class vtkPolyData;
 class vtkRenderer;
 class vtkTubeFilter;
@@ -56,17 +57,32 @@ public:
   void LookFromFront();
 
 private:
+  /// A drawn point's normal as it is on the whole wall, in a frame of the vessel's axis that it moves with.
+  struct AxisNormal
+  {
+    std::size_t before = 0; ///< places in SessionSnapshot::axis: the axis runs from here
+    std::size_t at = 0;
+    std::size_t after = 0;            ///< to here
+    Vector3 normal = Vector3::Zero(); ///< outwards, along, around
+  };
+  static Matrix3 FrameOf(
+    const AxisNormal& anchor, const std::vector<Vector3>& axis, const Vector3& point);
+
   void MakeWall(WallMotion& wall, std::int64_t triangles);
+  void AnchorNormals(WallMotion& wall, vtkPolyData* whole, const std::vector<Vector3>& rest);
+  void TurnNormals(const std::vector<Vector3>& points, const std::vector<Vector3>& axis);
   void MakeHeart();
   void MakeInstruments(const Scenario& scenario);
   void MakeTracers();
 
   std::shared_ptr<const HeartShell> Heart;
   std::vector<std::int64_t> Drawn;
+  std::vector<AxisNormal> Normals;
   std::vector<Vector3> HeartPoints;
 
   vtkNew<vtkRenderer> Renderer_;
   vtkNew<vtkPolyData> WallMesh;
+  vtkNew<vtkFloatArray> WallNormals;
   vtkNew<vtkActor> WallActor;
   vtkNew<vtkPolyData> HeartMesh;
   vtkNew<vtkActor> HeartActor;

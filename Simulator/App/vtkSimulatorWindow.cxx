@@ -7,6 +7,7 @@
 #include "Interruption.h"
 #include "Program.h"
 #include "RecordedDevices.h"
+#include "vtkLoadingWindow.h"
 #include "vtkWindowProgram.h"
 
 #include "vtkRenderer.h"
@@ -114,24 +115,23 @@ std::string NameOf(const Scenario& scenario)
     ? name + " - " + scenario.name
     : scenario.name;
 }
+
+QString TitleOf(const Scenario& scenario)
+{
+  return "DynamicCoronary simulator - " + QString::fromStdString(NameOf(scenario));
+}
 }
 
-SessionWindow::SessionWindow(const SessionWorld& world, const WindowOptions& options)
+SessionWindow::SessionWindow(
+  const SessionWorld& world, std::unique_ptr<vtkSimulatorScene> scene, const WindowOptions& options)
   : World(world)
   , Options(options)
+  , Scene(std::move(scene))
 {
   // For as long as the window is open: nobody should take this motion for the patient's.
   const std::string foreign = world.foreignMotion.empty() ? "" : " - " + world.foreignMotion;
-  this->setWindowTitle(
-    "DynamicCoronary simulator - " + QString::fromStdString(NameOf(world.scenario) + foreign));
+  this->setWindowTitle(TitleOf(world.scenario) + QString::fromStdString(foreign));
   this->resize(options.width, options.height);
-  std::shared_ptr<const HeartShell> heart;
-  if (options.heart)
-  {
-    heart = MakeHeartShell(*world.wall, world.scenario.vessels);
-  }
-  this->Scene = std::make_unique<vtkSimulatorScene>(
-    *world.wall, world.scenario, heart, SceneSettings{ options.triangles });
   for (const std::string& uri : options.devices)
   {
     this->Hardware.push_back(OpenDevice(uri, StartInputOf(world.scenario)));
@@ -821,12 +821,33 @@ void CheckWindow(const WindowOptions& options)
   }
 }
 
-void RunWindow(const SessionWorld& world, const WindowOptions& options)
+void RunWindow(const Scenario& scenario, const WorldLoader& load, const WindowOptions& options)
 {
   const vtkWindowProgram program("coronary-simulator", "DynamicCoronary simulator");
-  SessionWindow window(world, options);
+  QApplication::setQuitOnLastWindowClosed(false); // the first one makes room for the second
+  SessionWorld world;
+  std::unique_ptr<vtkSimulatorScene> scene;
+  LoadingWindow loading(TitleOf(scenario), options.width, options.height);
+  const bool loaded = loading.Run(
+    [&](const WorldProgress& progress)
+    {
+      world = load(progress);
+      progress("anatomy", 0.0);
+      scene = std::make_unique<vtkSimulatorScene>(*world.wall, world.scenario,
+        options.heart ? MakeHeartShell(*world.wall, world.scenario.vessels, world.heart.get())
+                      : nullptr,
+        SceneSettings{ options.triangles });
+      progress("", 1.0);
+    });
+  if (!loaded)
+  {
+    return;
+  }
+  QApplication::setQuitOnLastWindowClosed(true);
+  SessionWindow window(world, std::move(scene), options);
   window.Begin(options.record, options.replay);
   window.show();
+  loading.hide();
   QApplication::exec();
   ThrowIfInterrupted();
   if (!window.Trouble().isEmpty())

@@ -6,6 +6,7 @@
 #define DynamicCoronary_HeartShell_h
 
 #include "CoronaryPhantom.h"
+#include "PatientHeart.h"
 #include "PeriodicSpline.h"
 #include "Scenario.h"
 #include "WallMotion.h"
@@ -15,7 +16,8 @@
 
 namespace coronary
 {
-/// A closed surface with the connectivity of a sphere. No organ was measured for it, unless it is the phantom's.
+/// A closed surface with the connectivity of a sphere. No organ was measured for it but the arteries, unless it is the
+/// phantom's.
 class HeartShell
 {
 public:
@@ -23,12 +25,14 @@ public:
   explicit HeartShell(const PhantomSettings& phantom);
 
   /**
-   * A smooth star-shaped surface that the vessels lie on: its distance from the middle of the vessels is, in
-   * every direction, a mean of the vessels' distances, weighted by a bell of the angle between, in which the nearer ones
-   * count most.
+   * A smooth star-shaped surface that the vessels lie on, over an ellipsoid: the mean heart's where the patient's lies, as long
+   * and as wide as it is; without that, a sphere about the middle of the vessels. In every direction the ellipsoid is
+   * scaled by a mean of what the vessels' distances are of its own, weighted by a bell of the angle between, in which the
+   * nearer ones count most; where no vessel is near, it stays. Every place moves with the vessels near it.
+   * @param heart  may be null: not known
    * @throws std::invalid_argument  the vessels have no axis
    */
-  explicit HeartShell(WallMotion& wall);
+  explicit HeartShell(WallMotion& wall, const PatientHeart* heart = nullptr);
 
   const std::vector<Triangle>& Triangles() const { return this->Triangles_; }
 
@@ -43,8 +47,10 @@ private:
 };
 
 /// The phantom's if the vessels are the phantom's and move as it does, else one that lies under them.
+/// @param heart  the patient's; may be null: not known
 /// @throws std::invalid_argument  the vessels have no axis
-std::shared_ptr<const HeartShell> MakeHeartShell(WallMotion& wall, const VesselSource& vessels);
+std::shared_ptr<const HeartShell> MakeHeartShell(
+  WallMotion& wall, const VesselSource& vessels, const PatientHeart* heart = nullptr);
 }
 
 #endif

@@ -1,10 +1,11 @@
-#include "vtkVesselModel.h"
+#include "VesselModel.h"
 
 #include "ContractionMotion.h"
 #include "FileSeries.h"
 #include "WallMotions.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkDataFiles.h"
+#include "vtkMessageTrap.h"
 #include "vtkSkeletonForms.h"
 #include "vtkVesselTree.h"
 
@@ -19,6 +20,7 @@
 #include "vtkUnstructuredGrid.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -313,12 +315,38 @@ PoseSequence PosesOf(const std::string& list, const Skeleton& skeleton, vtkMessa
   return poses;
 }
 
+/// The patient's heart by its named vessels; null where their names do not tell it.
+std::shared_ptr<const PatientHeart> HeartOf(vtkPolyData* lines)
+{
+  vtkDataArray* frame = lines->GetFieldData()->GetArray(names::HeartFrame);
+  if (!frame || frame->GetNumberOfValues() != 16)
+  {
+    return nullptr;
+  }
+  std::array<double, 16> matrix{};
+  for (vtkIdType n = 0; n < 16; ++n)
+  {
+    matrix[static_cast<std::size_t>(n)] = frame->GetVariantValue(n).ToDouble();
+  }
+  try
+  {
+    VesselTree tree = vtkCoronary::TreeOf(lines);
+    vtkCoronary::AddPointValues(lines, tree);
+    return std::make_shared<PatientHeart>(EstimateHeart(tree, HeartPoseOf(matrix)));
+  }
+  catch (const std::invalid_argument&)
+  {
+    return nullptr;
+  }
+}
+
 /// The wall at rest, its topology and where it is from.
 struct RestingWall
 {
   std::string path;
   Boundary boundary;
   WallTopology topology;
+  std::shared_ptr<const PatientHeart> heart;
 };
 
 RestingWall ReadWall(const std::string& surface, const std::string& centerline,
@@ -327,8 +355,9 @@ RestingWall ReadWall(const std::string& surface, const std::string& centerline,
   RestingWall wall;
   wall.path = surface;
   wall.boundary = BoundaryOf(ReadPolyData(surface, messages), surface);
-  wall.topology =
-    TopologyOf(wall.boundary, ReadPolyData(centerline, messages), centerline, progress);
+  const auto tree = ReadPolyData(centerline, messages);
+  wall.topology = TopologyOf(wall.boundary, tree, centerline, progress);
+  wall.heart = HeartOf(tree);
   return wall;
 }
 
@@ -447,6 +476,7 @@ VesselModel LoadRun(
                                       : FileOfRun(source.path, "surface.vtp", "surface");
   const RestingWall wall =
     ReadWall(surface, FileOfRun(source.path, "centerline.vtp", "centerline"), messages, progress);
+  model.heart = wall.heart;
   if (tracked)
   {
     model.wall = TrackedWall(source.path, wall, model, messages);
@@ -461,9 +491,9 @@ VesselModel LoadRun(
 }
 }
 
-VesselModel LoadVessels(
-  const VesselSource& source, vtkMessageTrap& messages, const ProgressCallback& progress)
+VesselModel LoadVessels(const VesselSource& source, const ProgressCallback& progress)
 {
+  vtkMessageTrap messages;
   VesselModel model;
   switch (source.kind)
   {

@@ -1,4 +1,4 @@
-#include <CoronaryPhantom.h>
+#include <DynamicCoronary/CoronaryPhantom.h>
 
 #include <cstdlib>
 #include <iostream>

@@ -1,4 +1,4 @@
-#include <vtkCoronaryPhantomSource.h>
+#include <DynamicCoronary/vtkCoronaryPhantomSource.h>
 
 #include <vtkInformation.h>
 #include <vtkNew.h>

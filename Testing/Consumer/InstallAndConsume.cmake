@@ -47,11 +47,16 @@ run("configuring the consumer" "${CMAKE_COMMAND}" -S "${SOURCE_DIR}" -B "${WORK_
   "-DCMAKE_BUILD_TYPE=${BUILD_TYPE}"
   "-DCMAKE_C_COMPILER=${C_COMPILER}"
   "-DCMAKE_CXX_COMPILER=${CXX_COMPILER}"
-  "-DCMAKE_PREFIX_PATH=${prefix}")
+  "-DCMAKE_PREFIX_PATH=${prefix}"
+  "-DRUN=${WORK_DIR}/patient")
+# A patient's result: coarse images of the phantom at one phase, moved as a population's hearts are.
+run("the installed coronary-pipeline phantom" "${prefix}/bin/coronary-pipeline" phantom --seed 2 --fractions 0.75
+  --spacing 0.8 --no-truth --quiet --output "${WORK_DIR}/images")
+run("the installed coronary-pipeline run" "${prefix}/bin/coronary-pipeline" run "${WORK_DIR}/images/series.json" --quiet
+  --edges 0.5 1.5 --output "${WORK_DIR}/patient")
 run("building the consumer" "${CMAKE_COMMAND}" --build "${WORK_DIR}/consumer")
 run("running the consumer" "${CMAKE_CTEST_COMMAND}" --test-dir "${WORK_DIR}/consumer"
   --output-on-failure --no-tests=error)
-run("running the installed coronary-pipeline" "${prefix}/bin/coronary-pipeline" --help)
 
 if(PVPYTHON)
   file(GLOB_RECURSE plugin "${prefix}/*/DynamicCoronaryPlugin.so")

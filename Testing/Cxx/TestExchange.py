@@ -88,9 +88,9 @@ def write_mask(path, space="left-posterior-superior", shift=0.0):
         file.write(header.encode() + b"\n" + gzip.compress(bytes(pairs), mtime=0))
 
 
-def write_image(path):
+def write_image(path, vessel=400, tissue=40):
     """The tube in CT, as MetaImage."""
-    values = grid(lambda i, j, k: 400 if tube(i, j, k) else 40)
+    values = grid(lambda i, j, k: vessel if tube(i, j, k) else tissue)
     header = (f"ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n"
               f"TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 0 0 0\nElementSpacing = {SPACING} {SPACING} {SPACING}\n"
               f"DimSize = {SIZE} {SIZE} {SIZE}\nElementType = MET_SHORT\nElementDataFile = LOCAL\n")
@@ -315,10 +315,45 @@ def scenes():
     check(b"axis 3 index values:=0 400" in header and len(voxels) == 2 * 2 * SIZE ** 3, "image sequence")
 
 
+def whole_scene():
+    """Of a moving folder with a mask: the segmentation is the mask, the transforms bring the tree to where it is."""
+    run("phantom", "--seed", "5", "--truth-only", "--phases", "3", "--quiet", "--surface-spacing", "1.5", "--centerline-spacing",
+        "3", "--output", "moving")
+    write_image("moving/mask.mha", 1, 0)
+    run("slicer", "moving", "--quiet", "--output", "whole")
+    scene = xml.parse("whole/scene.mrml").getroot()
+    storage = scene.find("SegmentationStorage")
+    segmentation = scene.find("Segmentation")
+    check(storage.get("fileName") == "mask.seg.nrrd" and storage.get("id") in segmentation.get("references"), "segmentation")
+    run("convert", "moving/mask.mha", "mask.obj")
+    run("convert", "whole/mask.seg.nrrd", "segment.obj", "--segment", "Coronary arteries")
+    check(read_obj("mask.obj")[:2] == read_obj("segment.obj")[:2], "the segment is the mask")
+    inner = xml.parse("whole/transform.seq.mrml").getroot()
+    matrices = {node.get("id"): [float(word) for word in node.get("matrixTransformToParent").split()]
+                for node in inner.iter("LinearTransform")}
+    items = [item.split(":")[0] for item in inner.find("Sequence").get("indexValues").split(";")]
+    check(items == list(matrices) and len(items) == 3, f"a transform a moment: {items}")
+    names = [storage.get("fileName") for storage in xml.parse("whole/centerlines.seq.mrml").getroot().iter("ModelStorage")]
+    trees = [read_vtp("whole/" + name)[0]["Points"] for name in names]
+    greatest = 0.0
+    for item, tree in zip(items, trees):
+        m = matrices[item]
+        still = moved = 0.0
+        for start, now in zip(trees[0], tree):
+            ras = (-start[0], -start[1], start[2])
+            there = [sum(m[4 * row + c] * ras[c] for c in range(3)) + m[4 * row + 3] for row in range(3)]
+            moved += math.dist((-there[0], -there[1], there[2]), now) ** 2
+            still += math.dist(start, now) ** 2
+        still, moved = (math.sqrt(total / len(tree)) for total in (still, moved))
+        greatest = max(greatest, still)
+        check(moved < 1e-6 if tree is trees[0] else moved < 0.5 * still, f"{item}: {moved} mm left of {still} mm")
+    check(greatest > 2, "the phantom moves")
+
+
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as work:
         os.chdir(work)
-        for part in (masks, runs, truth, centerlines, scenes):
+        for part in (masks, runs, truth, centerlines, scenes, whole_scene):
             part()
         os.chdir("/")
     print(f"{len(failures)} failures")

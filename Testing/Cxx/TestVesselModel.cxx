@@ -1,8 +1,7 @@
 // Vessels out of a run's files: the right points move with the right bones, and what is broken is named.
-#include "vtkVesselModel.h"
+#include "VesselModel.h"
 
 #include "VesselTestData.h"
-#include "vtkMessageTrap.h"
 
 #include <gtest/gtest.h>
 
@@ -39,7 +38,7 @@ protected:
     source.kind = VesselSource::Kind::Run;
     source.path = this->Folder.string();
     source.motion = motion;
-    return coronary::LoadVessels(source, this->Messages);
+    return coronary::LoadVessels(source);
   }
 
   /// One sentence that names the file.
@@ -57,11 +56,9 @@ protected:
       EXPECT_NE(text.find(file), std::string::npos) << text;
       EXPECT_NE(text.find(part), std::string::npos) << text;
     }
-    this->Messages.ForgetWarnings();
   }
 
   fs::path Folder;
-  vtkMessageTrap Messages;
 };
 }
 
@@ -71,6 +68,7 @@ TEST_F(TestVesselModel, MovesWithItsSkeleton)
   const coronary::WallTopology& topology = model.wall->Topology();
   EXPECT_EQ(model.motion, "tracked at 5 moments");
   EXPECT_TRUE(model.notes.empty());
+  EXPECT_EQ(model.heart, nullptr) << "nothing says where a bar's heart is";
   ASSERT_EQ(topology.axis.size(), 1U);
   EXPECT_EQ(topology.groupName[0], "pRCA");
   EXPECT_EQ(topology.parent[0], -1);

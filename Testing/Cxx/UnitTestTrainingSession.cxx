@@ -1,6 +1,7 @@
 // A session as a whole: what is counted of the trainee, that it repeats, and what its X-ray images show.
 #include "Electrocardiogram.h"
 #include "HeartShell.h"
+#include "PhantomAnatomy.h"
 #include "SessionImager.h"
 #include "TrainingSession.h"
 #include "WallMotions.h"
@@ -9,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <map>
 #include <memory>
@@ -333,9 +335,24 @@ TEST(SessionImager, ABackgroundWithoutInstrumentsIsThePatient)
 TEST(HeartShell, LiesUnderTheArteriesAndBeatsWithThem)
 {
   const Scenario scenario = TestScenario();
-  for (const bool own : { true, false })
+  const HeartFrame frame = PhantomAnatomy(scenario.vessels.phantom).frame;
+  PatientHeart measured;
+  measured.axes = frame.axes;
+  measured.base = frame.origin;
+  measured.length = HeartFrame::ApexHeight * frame.size;
+  measured.rightWidth *= frame.size;
+  enum class Kind
   {
-    const HeartShell shell = own ? HeartShell(scenario.vessels.phantom) : HeartShell(*Phantom());
+    Phantoms,
+    Patients,
+    Unknown
+  };
+  for (const Kind kind : { Kind::Phantoms, Kind::Patients, Kind::Unknown })
+  {
+    const bool own = kind != Kind::Unknown;
+    const HeartShell shell = kind == Kind::Phantoms
+      ? HeartShell(scenario.vessels.phantom)
+      : HeartShell(*Phantom(), kind == Kind::Patients ? &measured : nullptr);
     std::vector<Vector3> points;
     std::map<std::pair<std::int64_t, std::int64_t>, int> edges;
     for (const Triangle& triangle : shell.Triangles())
@@ -386,6 +403,37 @@ TEST(HeartShell, LiesUnderTheArteriesAndBeatsWithThem)
       }
       // All but the septal branches, which dive into the muscle.
       EXPECT_GT(static_cast<double>(above), 0.7 * static_cast<double>(axis.size()));
+    }
+    if (kind == Kind::Patients)
+    {
+      // As long as the heart, and no place far from the phantom's own epicardium, also where there is no vessel.
+      shell.Positions(0.75, points);
+      std::vector<Vector3> truth;
+      HeartShell(scenario.vessels.phantom).Positions(0.75, truth);
+      const auto height = [&](const Vector3& point) { return frame.ToHeart(point)[2]; };
+      const auto lowest = [&](const std::vector<Vector3>& shape)
+      {
+        double deepest = 0.0;
+        for (const Vector3& point : shape)
+        {
+          deepest = std::max(deepest, height(point));
+        }
+        return deepest;
+      };
+      EXPECT_NEAR(lowest(points), lowest(truth), 12.0);
+      double sum = 0.0;
+      for (const Vector3& point : points)
+      {
+        double nearest = 1e9;
+        for (const Vector3& other : truth)
+        {
+          nearest = std::min(nearest, (other - point).norm());
+        }
+        sum += nearest;
+      }
+      EXPECT_LT(sum / static_cast<double>(points.size()), 8.0) << "mm";
+      std::printf("mean distance from the phantom's heart %.1f mm, lowest %.1f and %.1f mm\n",
+        sum / static_cast<double>(points.size()), lowest(points), lowest(truth));
     }
   }
 }

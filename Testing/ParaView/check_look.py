@@ -62,6 +62,10 @@ require(abs(position.GetValue(table.GetNumberOfRows() - 1) / lad - 1.0) < 0.15, 
 for name in ("5 %", "35 %", "75 %", "Least", "Median", "Greatest", "Healthy"):
     require(table.GetColumnByName(name) is not None, "the profile has no column " + name)
 require(fetch(cycle, look_along_vessel.MAP, 0.35).GetNumberOfPoints() == 3 * table.GetNumberOfRows(), "the map has other points")
+require(made["map"] is not None and made["lesions"].GetXMLName() == "SpreadSheetView", "no map or no table of lesions")
+path = os.path.join(folder, "map.png")
+simple.SaveScreenshot(path, made["map"], ImageResolution=[400, 240])
+require(len(set(pixels(path))) > 50, "the map's picture is empty")
 simple.SaveScreenshot(os.path.join(folder, "look.png"), made["layout"])
 
 # Another vessel.

@@ -1,29 +1,30 @@
 #include "SessionWorld.h"
 
-#include "Interruption.h"
-#include "ProgressDisplay.h"
+#include "ParallelFor.h"
 #include "Recording.h"
 #include "SessionImager.h"
-#include "vtkMessageTrap.h"
-#include "vtkVesselModel.h"
+#include "VesselModel.h"
 
 namespace coronary
 {
-SessionWorld LoadWorld(const Scenario& scenario, bool background, ProgressDisplay& progress)
+SessionWorld LoadWorld(const Scenario& scenario, bool background, const WorldProgress& progress)
 {
-  const auto report = [&progress](double fraction)
+  const auto step = [&progress](const char* what)
   {
-    progress.Update(fraction);
-    return Interruption() == 0;
+    const ProgressCallback report = [&progress, what](double fraction)
+    { return progress(what, fraction); };
+    if (!report(0.0))
+    {
+      throw Cancelled();
+    }
+    return report;
   };
   SessionWorld world;
   world.scenario = scenario;
-  int step = 0;
   const auto loadPatient = [&](const WallTopology& topology)
   {
-    progress.BeginStep(step++, "patient");
-    world.background = MakeProjector(LoadBackground(scenario, topology, report), scenario.imaging);
-    ThrowIfInterrupted();
+    world.background =
+      MakeProjector(LoadBackground(scenario, topology, step("patient")), scenario.imaging);
   };
   // A CT lies where it lies: what is wrong with it is told before the vessels are made, which takes longer.
   const bool hasImages = !scenario.imaging.background.empty();
@@ -31,14 +32,11 @@ SessionWorld LoadWorld(const Scenario& scenario, bool background, ProgressDispla
   {
     loadPatient({});
   }
-  vtkMessageTrap messages;
-  progress.BeginStep(step++, "vessels");
-  VesselModel model = LoadVessels(scenario.vessels, messages, report);
-  ThrowIfInterrupted();
-  messages.ForgetWarnings();
+  VesselModel model = LoadVessels(scenario.vessels, step("vessels"));
   world.wall = model.wall;
   world.motion = model.motion;
   world.notes = model.notes;
+  world.heart = model.heart;
   world.foreignMotion = model.foreignMotion;
   world.wallHash = WallHash(*world.wall);
   const WallTopology& topology = world.wall->Topology();
