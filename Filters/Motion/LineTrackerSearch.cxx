@@ -21,6 +21,21 @@ constexpr double CoarseLimit = 20.0;
 /// How far a vessel moves between phases that are neighbours in time: one standard deviation along each axis, mm.
 constexpr double UsualStep = 8.0;
 
+/// Of the patch around every place.
+std::vector<std::vector<float>> ValuesAround(
+  const std::vector<Vector3>& places, const Patch& patch, const AveragedVolume& volume)
+{
+  std::vector<std::vector<float>> values(places.size());
+  for (std::size_t n = 0; n < places.size(); ++n)
+  {
+    for (std::size_t p = 0; p < patch.places.size(); ++p)
+    {
+      values[n].push_back(volume.Sample(places[n] + patch.Offset(p)));
+    }
+  }
+  return values;
+}
+
 /// What UsualStep says of every shift.
 void PreferShort(const LabelLattice& lattice, std::vector<std::vector<float>>& costs)
 {
@@ -91,20 +106,10 @@ void LineTracker::SearchCoarsely()
   const std::vector<std::vector<float>> weights = this->Settings.tissue
     ? this->WithoutVessels(this->Coarse, 0.5 * this->Settings.coarseSpacing)
     : std::vector<std::vector<float>>(nodes, this->Coarse.weights);
-  const auto valuesOf = [&](const Patch& patch)
-  {
-    std::vector<std::vector<float>> values(nodes);
-    for (std::int64_t n = 0; n < nodes; ++n)
-    {
-      for (std::size_t p = 0; p < patch.places.size(); ++p)
-      {
-        values[n].push_back(averaged.Sample(this->Nodes.position[n] + patch.Offset(p)));
-      }
-    }
-    return values;
-  };
-  std::vector<std::vector<float>> wanted = valuesOf(this->Coarse);
-  std::vector<std::vector<float>> wantedVessel = valuesOf(this->CoarseVessel);
+  std::vector<std::vector<float>> wanted =
+    ValuesAround(this->Nodes.position, this->Coarse, averaged);
+  std::vector<std::vector<float>> wantedVessel =
+    ValuesAround(this->Nodes.position, this->CoarseVessel, averaged);
   std::vector<float> all;
   for (const std::vector<float>& one : wanted)
   {
