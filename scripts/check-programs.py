@@ -3,8 +3,10 @@
 
 Usage: check-programs.py BIN_DIRECTORY
 
-- every option of every command has its place in the page that documents it, with its default, and every option in a
-  table there exists;
+- every option is explained by --help, which the pages do not repeat;
+- every command of coronary-pipeline has its section in the page of the programs, and is in its table of commands;
+- every option that the section or page of a program names exists, and where a table there gives a default, it is the
+  program's;
 - every command line in any page, in a code block or in backticks, names a program, command and options that exist.
 Exit code 1 when one does not.
 """
@@ -16,10 +18,11 @@ import subprocess
 import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-# Where the options of a program are documented; of the commands of coronary-pipeline in a section each.
+# The page of a program; the commands of coronary-pipeline have a section each.
 PAGES = {"coronary-simulator": "docs/simulator-files.md", "coronary-posing": "docs/posing.md",
          "coronary-device-emulator": "docs/device-protocol.md"}
 COMMANDS_PAGE = "docs/programs.md"
+KNOWN = ("coronary-pipeline", *PAGES)
 OPTION = re.compile(r"(?<![\w/-])--[a-z][\w-]*")
 # Not in every build tree: they need Google's benchmark library.
 OPTIONAL = {"skin-deformation-benchmark", "motion-benchmark", "vessel-wall-benchmark", "intervention-benchmark",
@@ -59,6 +62,17 @@ class Programs:
                 result[name] = default.group(1) if default else None
         return result
 
+    def unexplained(self, program, command=""):
+        """Options without a text behind them: from column 30 on, or in the next line."""
+        found = re.findall(r"^(\s+(?:-\w,)?(--[a-z][\w-]*)[^\n]*)\n(?=([^\n]*))", self.help(program, command), re.M)
+        return [name for line, name, below in found
+                if not re.match(r".{29} \S", line) and not re.match(r"\s{20,}\S", below)]
+
+    def every_option(self, program):
+        """Options of a program and of all its commands."""
+        names = set(OPTION.findall(self.help(program)))
+        return names.union(*[OPTION.findall(self.help(program, command)) for command in self.commands(program)])
+
 
 def read(path):
     with open(os.path.join(ROOT, path), encoding="utf-8") as file:
@@ -85,15 +99,13 @@ def number_or_text(word):
         return word
 
 
-def check_command(programs, program, command, text, inherited, page, complaints):
-    """The options of a command against its text."""
+def check_command(programs, program, command, text, page, complaints):
+    """The options of a command against its text, and whether --help explains them."""
     where = "%s: %s" % (page, " ".join(filter(None, [program, command])))
     options = programs.options(program, command)
+    for option in programs.unexplained(program, command):
+        complaints.append("%s --help: %s is not explained" % (" ".join(filter(None, [program, command])), option))
     for option, default in options.items():
-        if not re.search(r"%s(?![\w-])" % option, text):
-            if not inherited or not re.search(r"%s(?![\w-])" % option, inherited):
-                complaints.append("%s: %s is not there" % (where, option))
-            continue
         rows = rows_with(option, text)
         cells = rows[0].split("|") if rows else []
         alone = rows and len(OPTION.findall(cells[1])) == 1
@@ -109,12 +121,18 @@ def check_command(programs, program, command, text, inherited, page, complaints)
             for option in OPTION.findall(line.split("|")[1]):
                 if option not in options:
                     complaints.append("%s: %s does not exist" % (where, option))
+    # In prose, options alone in backticks: of this command, or of another one that the section speaks of.
+    for span in re.findall(r"`(--[a-z][^`\n]*)`", text):
+        for option in OPTION.findall(span):
+            if option not in options and not any(option in programs.every_option(known) for known in KNOWN):
+                complaints.append("%s: %s does not exist" % (where, option))
 
 
 def command_lines(text):
     """Command lines in code blocks and in backticks."""
-    for block in re.findall(r"^```(?:sh|bash|console)?\n(.*?)^```", text, re.M | re.S):
-        yield from re.sub(r"\\\n\s*", " ", block).splitlines()
+    for kind, block in re.findall(r"^```([^`\n]*)\n(.*?)^```", text, re.M | re.S):
+        if kind in ("", "sh", "bash", "console"):
+            yield from re.sub(r"\\\n\s*", " ", block).splitlines()
     yield from (line.strip() for line in re.findall(r"^    (?:\S.*)$", text, re.M))
     for span in re.findall(r"(?<!`)`([^`]+)`(?!`)", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S)):
         yield " ".join(span.split())
@@ -155,14 +173,14 @@ def main(arguments):
     complaints = []
     parts = sections(read(COMMANDS_PAGE))
     for command in programs.commands("coronary-pipeline"):
-        text = parts.get(command, "")
-        inherited = parts.get("phantom", "") if "Takes the options of" in text else ""
-        check_command(programs, "coronary-pipeline", command, text, inherited, COMMANDS_PAGE, complaints)
-        if "`coronary-pipeline %s`" % command not in read(COMMANDS_PAGE):
+        if command not in parts:
+            complaints.append("%s: %s has no section" % (COMMANDS_PAGE, command))
+        check_command(programs, "coronary-pipeline", command, parts.get(command, ""), COMMANDS_PAGE, complaints)
+        if not re.search(r"^\| `%s` \|" % command, parts["coronary-pipeline"], re.M):
             complaints.append("%s: %s is not in the table of commands" % (COMMANDS_PAGE, command))
     for program, page in PAGES.items():
         if programs.exists(program):
-            check_command(programs, program, "", read(page), "", page, complaints)
+            check_command(programs, program, "", read(page), page, complaints)
     pages = ["README.md"] + sorted(os.path.relpath(path, ROOT) for path in glob.glob(os.path.join(ROOT, "docs", "*.md")))
     lines = 0
     for page in pages:

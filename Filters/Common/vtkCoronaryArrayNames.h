@@ -1,9 +1,9 @@
 /**
  * @file vtkCoronaryArrayNames.h
- * @brief Names of the arrays that travel between the stages.
+ * @brief Names of the arrays between the stages.
  *
  * They are fixed: a filter has a property for an array only where users bring data of their own.
- * Names follow VMTK where VMTK has one. See docs/design.md, "What travels between the stages".
+ * Names follow VMTK where VMTK has one. See docs/design.md, "Data between the stages".
  */
 #ifndef vtkCoronaryArrayNames_h
 #define vtkCoronaryArrayNames_h

@@ -38,7 +38,7 @@ def build(source=None, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), larges
     window        HU of tissue and of blood; none: from the image
     show, size    makes a layout of three views, of so many pixels together
     heart_rate    of a population's motion, beats a minute; 0: that of the data
-    The others are the settings of `coronary-pipeline run` of the same names (docs/programs.md).
+    The others are the settings of `coronary-pipeline run` of the same names (`--help`).
 
     Returns the stages by short names ("reference" ... "wall"), with "layout" and "views" when shown. Raises
     RuntimeError with one sentence when a stage finds nothing; the stages before it stay.
