@@ -1,5 +1,6 @@
 #include "Intervention.h"
 
+#include "CatheterFriction.h"
 #include "CatheterPath.h"
 #include "CosseratRod.h"
 #include "CyclicTime.h"
@@ -134,8 +135,9 @@ struct Intervention::Internals : ContactSurface
   double Spring = 0.0;      // N mm/rad, of the wire in the catheter
   double CatheterTip = 0.0; // u
   double CatheterAngle = 0.0;
-  double HandSpeed = 0.0;
-  double CapstanExponent = 0.0; // exponent of the capstan equation for the whole catheter
+  double HandSpeed = 0.0;    // mm/s
+  double HandTurning = 0.0;  // rad/s
+  CatheterFriction Friction; // of the catheter behind the rod
 
   struct Sane
   {
@@ -495,6 +497,7 @@ void Intervention::Internals::Drive(const DriveInput& input)
   {
     this->Say(Notice::NotFinite);
     this->HandSpeed = 0.0;
+    this->HandTurning = 0.0;
     return;
   }
   const double most = this->Settings.maximumSpeed * this->Step;
@@ -514,6 +517,7 @@ void Intervention::Internals::Drive(const DriveInput& input)
   this->HandAngle += turn;
   this->HandPosition += way;
   this->HandSpeed = way / this->Step;
+  this->HandTurning = turn / this->Step;
   this->Fed += way;
 
   // The catheter is moved by a hand, too: slowly.
@@ -672,10 +676,11 @@ void Intervention::Internals::Measure()
   Vector3 torque;
   this->Rod->Reaction(last, force, torque);
   const Vector3 forward = -this->Rod->Axis(last);
-  report.proximalTorque = this->Spring * this->Rod->Lag(last);
-  // The catheter's bends multiply what the hand feels (capstan), against the way that it moves.
-  const double sense = std::clamp(this->HandSpeed, -1.0, 1.0); // mm/s
-  report.proximalForce = force.dot(forward) * std::exp(sense * this->CapstanExponent);
+  const HandLoad felt =
+    this->Friction.AtHand({ force.dot(forward), this->Spring * this->Rod->Lag(last) },
+      this->HandSpeed, this->HandTurning);
+  report.proximalForce = felt.force;
+  report.proximalTorque = felt.torque;
   if (report.inserted <= 0.0)
   {
     report.branch = -1;
@@ -706,7 +711,10 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   data.Wire = wire;
   data.Catheter = catheter;
   data.Settings = settings;
-  data.CapstanExponent = catheter.friction * catheter.TurnedAngle(catheter.length);
+  // The rod itself rubs on the catheter's end.
+  data.Friction = CatheterFriction(catheter.friction *
+      (catheter.TurnedAngle(catheter.length) - catheter.TurnedAngle(settings.insideCatheter)),
+    AlongWire(wire, 0.5 * wire.length, [](const WireSection& s) { return s.radius; }));
   data.Step = 1.0 / settings.tickRate;
   data.FrameSeconds = data.Step * settings.ticksPerFrame;
   data.Phase = Modulo(settings.startPhase);

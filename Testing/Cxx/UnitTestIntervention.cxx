@@ -101,6 +101,26 @@ TEST(Intervention, FollowsTheBeatingWall)
   EXPECT_LT((last - before).norm(), 8.0) << "after two beats it is back, but for what slid";
 }
 
+TEST(Intervention, AWireThatIsPulledResistsThePull)
+{
+  Intervention intervention(Phantom(), Wire("workhorse"), Catheter("JL4-6F"), SettingsFor("LCA"));
+  DriveInput input;
+  const auto meanForce = [&](double speed, int ticks)
+  {
+    double sum = 0.0;
+    for (int k = 0; k < ticks; ++k)
+    {
+      input.wirePosition += speed / 2000.0;
+      sum += intervention.Step(input).proximalForce / ticks;
+    }
+    return sum;
+  };
+  const double pushed = meanForce(20.0, 5000);
+  const double pulled = meanForce(-20.0, 2000);
+  EXPECT_GT(pushed, 0.002);
+  EXPECT_LT(pulled, -0.002);
+}
+
 // Recorded hands: where they bring the wire, and that it stays in the lumen on the way.
 class Replay : public testing::TestWithParam<std::array<const char*, 4>>
 {
