@@ -1,6 +1,7 @@
 #include "NrrdSequenceWriter.h"
 
 #include "ByteOrder.h"
+#include "NrrdText.h"
 #include "PackedFile.h"
 #include "TextWords.h"
 
@@ -13,13 +14,6 @@ namespace coronary
 {
 namespace
 {
-std::string VectorText(const Vector3& vector)
-{
-  std::string text = "(";
-  AppendNumbers(text, vector, ",");
-  return text + ")";
-}
-
 void Check(const std::string& path, const ImageGrid& grid, const SequenceIndex& index)
 {
   const auto refuse = [&](const char* what)
@@ -68,16 +62,12 @@ void Write(const std::string& path, const ImageGrid& grid, const SequenceIndex& 
     header += " " + std::to_string(size);
     voxels *= static_cast<std::uint64_t>(size);
   }
-  header += " " + std::to_string(index.values.size()) + "\nspace directions:";
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    header += " " + VectorText(grid.direction.col(axis) * grid.spacing[axis]);
-  }
+  header +=
+    " " + std::to_string(index.values.size()) + "\nspace directions:" + NrrdDirections(grid);
   header += std::string(" none\nkinds: domain domain domain list\n") +
     "endian: " + (HostIsBigEndian() ? "big" : "little") +
     "\nencoding: " + (compress ? "gzip" : "raw") + "\nlabels: \"\" \"\" \"\" \"" + index.name +
-    "\"\nunits: \"\" \"\" \"\" \"" + index.unit +
-    "\"\nspace origin: " + VectorText(grid.IndexToWorld(e[0], e[2], e[4])) +
+    "\"\nunits: \"\" \"\" \"\" \"" + index.unit + "\"\nspace origin: " + NrrdOrigin(grid) +
     "\naxis 3 index type:=numeric\naxis 3 index values:=";
   AppendNumbers(header, index.values);
   header += "\nDataNodeClassName:=vtkMRMLScalarVolumeNode\n\n";
