@@ -30,7 +30,6 @@ namespace names = vtkCoronaryArrayNames;
 
 /// Fewer moments do not show how a heart moves between them.
 constexpr int LeastPhases = 4;
-constexpr double SamePhase = 0.02; // of R-R
 
 /// Taken for the phase of what does not tell it, as masks and surfaces: most are of mid-diastole.
 constexpr double UsualPhase = 0.75;
@@ -42,7 +41,7 @@ int DifferentPhases(vtkGatedImageReader* reader)
   {
     const double time = reader->GetPhaseTime(n);
     if (std::none_of(times.begin(), times.end(),
-          [time](double other) { return CyclicDistance(time, other) < SamePhase; }))
+          [time](double other) { return CyclicDistance(time, other) < SameMoment; }))
     {
       times.push_back(time);
     }

@@ -22,6 +22,9 @@ inline double CyclicDistance(double a, double b)
   const double apart = std::abs(a - b);
   return std::abs(apart - std::round(apart));
 }
+
+/// Nearer in time than this, modulo the cycle, two phases show the same moment.
+inline constexpr double SameMoment = 0.02;
 }
 
 #endif

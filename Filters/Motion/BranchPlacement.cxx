@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 
 namespace coronary
@@ -18,9 +19,6 @@ constexpr std::array<double, PlacementSigns::Count> Weights = { -2.40, -1.72, -5
 /// More is less likely than a coin's throw, whatever else speaks for it.
 constexpr double MaximumUnseen = 0.5;
 constexpr double UnseenConfidence = 0.5;
-
-/// Nearer in time than this, modulo the cycle, two phases show the same moment.
-constexpr double SameMoment = 0.02;
 
 /// Mean of what is known of a line's points; nothing: 1.
 double MeanOf(const std::vector<double>& values, const std::vector<std::int64_t>& line)
@@ -71,16 +69,15 @@ std::array<double, PlacementSigns::Count> PlacementSigns::Values() const
   return { this->unclear, this->unseen, this->seldom, this->swept };
 }
 
-std::vector<PlacementSigns> SignsOfPlacement(const Polylines& rest,
-  const std::vector<double>& certainty, const PoseSequence& poses, std::size_t phase,
-  const ImageTiming& timing)
+std::vector<std::vector<PlacementSigns>> SignsOfPlacement(const Polylines& rest,
+  const std::vector<double>& certainty, const PoseSequence& poses, const ImageTiming& timing)
 {
   constexpr RequireOf require{ "Placement" };
-  require(phase < poses.status.size() && poses.status.size() == poses.points.size(),
+  require(!poses.status.empty() && poses.status.size() == poses.points.size(),
     "the poses have no status");
   const std::size_t count = rest.points.size();
   require(certainty.empty() || certainty.size() == count, "the lines have other points");
-  std::vector<double> seen; // of each phase: share of the tree
+  std::vector<double> seen; // of each phase: how many of the tree's points
   for (std::size_t k = 0; k < poses.status.size(); ++k)
   {
     require(poses.points[k].size() == count && poses.status[k].size() == count,
@@ -92,18 +89,23 @@ std::vector<PlacementSigns> SignsOfPlacement(const Polylines& rest,
             [](TrackingStatus own) { return !IsUnseen(own); })));
   }
   const double all = std::accumulate(seen.begin(), seen.end(), 0.0);
-  std::vector<PlacementSigns> result;
+  std::vector<std::vector<PlacementSigns>> result(seen.size());
   for (const std::vector<std::int64_t>& line : rest.lines)
   {
     PlacementSigns signs;
     signs.unclear = 1.0 - MeanOf(certainty, line);
-    signs.unseen = UnseenShare(poses.status[phase], line);
-    for (std::size_t k = 0; k < seen.size() && all > 0.0; ++k)
-    {
-      signs.seldom += seen[k] / all * UnseenShare(poses.status[k], line);
-    }
     signs.swept = timing.window * Range(line, poses);
-    result.push_back(signs);
+    std::vector<double> unseen;
+    for (std::size_t k = 0; k < seen.size(); ++k)
+    {
+      unseen.push_back(UnseenShare(poses.status[k], line));
+      signs.seldom += all > 0.0 ? seen[k] / all * unseen[k] : 0.0;
+    }
+    for (std::size_t k = 0; k < seen.size(); ++k)
+    {
+      signs.unseen = unseen[k];
+      result[k].push_back(signs);
+    }
   }
   return result;
 }
@@ -132,31 +134,37 @@ double ConfidenceOfDeviation(double deviation)
   return std::erf(x / std::sqrt(2.0)) - std::sqrt(2.0 / EIGEN_PI) * x * std::exp(-0.5 * x * x);
 }
 
-std::vector<double> PlacementConfidences(const Polylines& rest,
-  const std::vector<double>& certainty, const PoseSequence& poses, std::size_t phase,
-  const ImageTiming& timing, const std::vector<double>& deviations)
+std::vector<std::vector<double>> PlacementConfidences(const Polylines& rest,
+  const std::vector<double>& certainty, const PoseSequence& poses, const ImageTiming& timing,
+  const std::vector<std::vector<double>>& deviations)
 {
-  const std::vector<PlacementSigns> signs = SignsOfPlacement(rest, certainty, poses, phase, timing);
-  std::vector<double> within;
-  for (const double deviation : deviations)
+  const std::vector<std::vector<PlacementSigns>> signs =
+    SignsOfPlacement(rest, certainty, poses, timing);
+  std::vector<std::vector<double>> result(signs.size());
+  for (std::size_t k = 0; k < signs.size(); ++k)
   {
-    within.push_back(ConfidenceOfDeviation(deviation));
-  }
-  std::vector<double> result(rest.points.size(), 0.0);
-  std::vector<bool> known(rest.points.size(), false);
-  for (std::size_t l = 0; l < rest.lines.size(); ++l)
-  {
-    PlacementSigns own = signs[l];
-    if (!within.empty())
+    std::vector<double> within;
+    if (!deviations.empty())
     {
-      // The tree's own: nothing was tracked.
-      own.unseen = 0.0;
+      std::transform(deviations[k].begin(), deviations[k].end(), std::back_inserter(within),
+        ConfidenceOfDeviation);
     }
-    const double chance = PlacementConfidence(own) * MeanOf(within, rest.lines[l]);
-    for (const std::int64_t p : rest.lines[l])
+    result[k].assign(rest.points.size(), 0.0);
+    std::vector<bool> known(rest.points.size(), false);
+    for (std::size_t l = 0; l < rest.lines.size(); ++l)
     {
-      result[p] = known[p] ? result[p] : chance;
-      known[p] = true;
+      PlacementSigns own = signs[k][l];
+      if (!within.empty())
+      {
+        // The tree's own: nothing was tracked.
+        own.unseen = 0.0;
+      }
+      const double chance = PlacementConfidence(own) * MeanOf(within, rest.lines[l]);
+      for (const std::int64_t p : rest.lines[l])
+      {
+        result[k][p] = known[p] ? result[k][p] : chance;
+        known[p] = true;
+      }
     }
   }
   return result;

@@ -46,15 +46,13 @@ struct PlacementSigns
 };
 
 /**
- * Of every line at one phase.
+ * Of every phase, and every line at it.
  * @param certainty  per point of the tree, 0 to 1, that its section is that of a vessel; empty: 1
  * @param poses      the same points at its phases, with status
- * @param phase      number of a phase
  * @throws std::invalid_argument when the poses lack a status, or anything is of other points
  */
-std::vector<PlacementSigns> SignsOfPlacement(const Polylines& rest,
-  const std::vector<double>& certainty, const PoseSequence& poses, std::size_t phase,
-  const ImageTiming& timing);
+std::vector<std::vector<PlacementSigns>> SignsOfPlacement(const Polylines& rest,
+  const std::vector<double>& certainty, const PoseSequence& poses, const ImageTiming& timing);
 
 /// Probability that a branch with these signs is within PlacedWithin of an artery. Of what is mostly unseen, at the phase or over
 /// all of them, 0.5 at most.
@@ -65,13 +63,13 @@ double PlacementConfidence(const PlacementSigns& signs);
 double ConfidenceOfDeviation(double deviation);
 
 /**
- * The probability of each line, at each of its points; where lines meet that of the first.
- * @param deviations  of a phase at which nothing was tracked: of each point's place, mm; else empty
+ * Of every phase: the probability of each line, at each of its points; where lines meet that of the first.
+ * @param deviations  of each phase: of each point's place where nothing was tracked, mm, or else empty; empty: all were tracked
  * @throws as SignsOfPlacement
  */
-std::vector<double> PlacementConfidences(const Polylines& rest,
-  const std::vector<double>& certainty, const PoseSequence& poses, std::size_t phase,
-  const ImageTiming& timing, const std::vector<double>& deviations = {});
+std::vector<std::vector<double>> PlacementConfidences(const Polylines& rest,
+  const std::vector<double>& certainty, const PoseSequence& poses, const ImageTiming& timing,
+  const std::vector<std::vector<double>>& deviations = {});
 }
 
 #endif

@@ -16,8 +16,6 @@ namespace coronary
 namespace
 {
 constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
-/// Nearer in time than this, modulo the cycle, two phases show the same moment.
-constexpr double SameMoment = 0.02;
 /// Correlation of a vessel with what was expected, above which it counts as seen.
 constexpr double TrackedLikeness = 0.65;
 constexpr double TrackedConfidence = 0.5;

@@ -106,7 +106,6 @@ constexpr double MisfitOutOfStep = 0.3; // share of that part
 constexpr double MisfitReach = 3.0;     // nodes of a vessel that go off together
 constexpr double SeenNodes = 10.0;      // mm
 constexpr double SeenConfidence = 0.5;  // that the tracker calls tracked
-constexpr double SamePhase = 0.02;      // of R-R
 
 constexpr double ConfidenceScale = 2.0; // mm
 constexpr double HighestConfidence = 0.5;
@@ -269,7 +268,7 @@ SeenPhases PhasesThatCount(const std::vector<double>& times, double reference)
   SeenPhases seen;
   for (std::size_t k = 0; k < times.size(); ++k)
   {
-    const auto same = [&](double other) { return CyclicDistance(times[k], other) < SamePhase; };
+    const auto same = [&](double other) { return CyclicDistance(times[k], other) < SameMoment; };
     if (!same(reference) && std::none_of(seen.times.begin(), seen.times.end(), same))
     {
       seen.times.push_back(times[k]);

@@ -126,7 +126,7 @@ struct vtkCenterlineTracker::Internals
   coronary::CenterlineTrackingReport Report;
   double Reference = 0.0;
   double Cycle = 0.0;
-  double Window = 0.0; ///< of an image, fraction of the cycle
+  std::vector<std::vector<double>> Placement; ///< per phase and point
 
   bool Knows(vtkCenterlineTracker* self, vtkInformationVector** inputs) const
   {
@@ -303,7 +303,6 @@ void vtkCenterlineTracker::Track(vtkInformationVector** inputs)
   data.Cycle =
     FieldValue(first, names::CycleLength, FieldValue(input, names::CycleLength, UsualCycleLength));
   settings.cycleLength = data.Cycle;
-  data.Window = settings.temporalWindow / data.Cycle;
 
   vtkCoronary::UpstreamRequest request(series, series);
   std::array<int, 6> whole{ 0, -1, 0, -1, 0, -1 };
@@ -349,6 +348,8 @@ void vtkCenterlineTracker::Track(vtkInformationVector** inputs)
   data.Poses = coronary::TrackCenterlines(data.Lines, data.Reference, times, imageAt, settings,
     &data.Report, vtkCoronary::ProgressOf(this),
     this->Sharing != nullptr ? *this->Sharing : coronary::ItemSharing::None());
+  data.Placement = coronary::PlacementConfidences(data.Lines, vtkMovedLines::CertaintyOf(input),
+    data.Poses, { data.Reference, settings.temporalWindow / data.Cycle });
   ++data.Trackings;
   data.Known = true;
   data.KnownOf = this->GetMTime();
@@ -393,9 +394,8 @@ int vtkCenterlineTracker::RequestData(
       }
     };
     write(input, vtkPoseSequences::MomentOf(data.Poses, phase), output[0]);
-    vtkCoronary::AddArray<vtkDoubleArray>(output[0]->GetPointData(), names::PlacementConfidence,
-      coronary::PlacementConfidences(data.Lines, vtkMovedLines::CertaintyOf(input), data.Poses,
-        phase, { data.Reference, data.Window }));
+    vtkCoronary::AddArray<vtkDoubleArray>(
+      output[0]->GetPointData(), names::PlacementConfidence, data.Placement[phase]);
 
     vtkInformation* skeletonInfo = Connection(inputs, SkeletonPort);
     vtkPolyData* skeleton = skeletonInfo != nullptr ? vtkPolyData::GetData(skeletonInfo) : nullptr;

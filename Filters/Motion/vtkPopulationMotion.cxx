@@ -80,6 +80,7 @@ struct vtkPopulationMotion::Internals
   coronary::PopulationMotionReport Report;
   double Reference = 0.0;
   double Cycle = 0.0;
+  std::vector<std::vector<double>> Placement; ///< per phase and point
   std::string Source;
 
   /// Whether what is there at a phase is the patient's own.
@@ -237,6 +238,13 @@ void vtkPopulationMotion::Move(vtkInformationVector** inputs, vtkInformation* ou
     settings, &data.Report, vtkCoronary::ProgressOf(this, 0.9, 1.0));
   data.Source =
     coronary::PopulationMotionStatement(data.Report.phases, settings.heartRate, settings.amplitude);
+  std::vector<std::vector<double>> deviations;
+  for (std::size_t k = 0; k < times.size(); ++k)
+  {
+    deviations.push_back(data.IsTracked(k) ? std::vector<double>() : data.Report.deviations[k]);
+  }
+  data.Placement = coronary::PlacementConfidences(data.Lines, vtkMovedLines::CertaintyOf(input),
+    data.Poses, { data.Reference, this->TemporalWindow / data.Cycle }, deviations);
   ++data.Motions;
   data.Known = true;
   data.KnownOf = this->GetMTime();
@@ -300,10 +308,8 @@ int vtkPopulationMotion::RequestData(
     };
     write(input, vtkPoseSequences::MomentOf(data.Poses, phase), data.Report.deviations[phase],
       output[0]);
-    vtkCoronary::AddArray<vtkDoubleArray>(output[0]->GetPointData(), names::PlacementConfidence,
-      coronary::PlacementConfidences(data.Lines, vtkMovedLines::CertaintyOf(input), data.Poses,
-        phase, { data.Reference, this->TemporalWindow / data.Cycle },
-        data.IsTracked(phase) ? std::vector<double>() : data.Report.deviations[phase]));
+    vtkCoronary::AddArray<vtkDoubleArray>(
+      output[0]->GetPointData(), names::PlacementConfidence, data.Placement[phase]);
 
     vtkInformation* skeletonInfo = Connection(inputs, SkeletonPort);
     vtkPolyData* skeleton = skeletonInfo != nullptr ? vtkPolyData::GetData(skeletonInfo) : nullptr;

@@ -44,7 +44,7 @@ TEST(BranchPlacement, SignsOfWhatIsSeen)
 {
   const Polylines lines = TwoLines();
   const std::vector<PlacementSigns> signs =
-    SignsOfPlacement(lines, {}, AtRest(lines), 0, { 0.5, 0.1 });
+    SignsOfPlacement(lines, {}, AtRest(lines), { 0.5, 0.1 })[0];
   ASSERT_EQ(signs.size(), 2U);
   for (const PlacementSigns& own : signs)
   {
@@ -75,7 +75,7 @@ TEST(BranchPlacement, SignsOfWhatIsNot)
     point[2] += 3.0;
   }
   const std::vector<PlacementSigns> signs =
-    SignsOfPlacement(lines, certainty, poses, 0, { 0.5, 0.1 });
+    SignsOfPlacement(lines, certainty, poses, { 0.5, 0.1 })[0];
   EXPECT_NEAR(signs[1].unseen, 10.0 / 21.0, 1e-12);
   EXPECT_NEAR(signs[1].unclear, 0.5 * 10.0 / 21.0, 1e-12);
   EXPECT_NEAR(signs[1].seldom, 31.0 / (31.0 + 41.0) * 10.0 / 21.0, 1e-12);
@@ -93,8 +93,8 @@ TEST(BranchPlacement, APhaseThatIsLostWhollySaysNothingOfABranch)
   poses.times = { 0.3, 0.7 };
   poses.points.push_back(lines.points);
   poses.status.emplace_back(lines.points.size(), TrackingStatus::Filled);
-  EXPECT_EQ(SignsOfPlacement(lines, {}, poses, 0, { 0.5, 0.1 })[1].seldom, 0.0);
-  EXPECT_EQ(SignsOfPlacement(lines, {}, poses, 1, { 0.5, 0.1 })[1].unseen, 1.0);
+  EXPECT_EQ(SignsOfPlacement(lines, {}, poses, { 0.5, 0.1 })[0][1].seldom, 0.0);
+  EXPECT_EQ(SignsOfPlacement(lines, {}, poses, { 0.5, 0.1 })[1][1].unseen, 1.0);
 }
 
 TEST(BranchPlacement, WhatIsSeenInOnePhaseOnlyIsNeverConfident)
@@ -108,7 +108,7 @@ TEST(BranchPlacement, WhatIsSeenInOnePhaseOnlyIsNeverConfident)
     poses.status.push_back(poses.status[0]);
     std::fill(poses.status[k].begin() + 21, poses.status[k].end(), TrackingStatus::Filled);
   }
-  const std::vector<double> said = PlacementConfidences(lines, {}, poses, 0, { 0.5, 0.1 });
+  const std::vector<double> said = PlacementConfidences(lines, {}, poses, { 0.5, 0.1 })[0];
   EXPECT_GT(said[0], 0.95);
   EXPECT_LE(said[40], 0.5);
 }
@@ -129,8 +129,8 @@ TEST(BranchPlacement, OneNumberForEachLine)
 {
   const Polylines lines = TwoLines();
   const PoseSequence poses = AtRest(lines);
-  const std::vector<PlacementSigns> signs = SignsOfPlacement(lines, {}, poses, 0, { 0.5, 0.1 });
-  const std::vector<double> result = PlacementConfidences(lines, {}, poses, 0, { 0.5, 0.1 });
+  const std::vector<PlacementSigns> signs = SignsOfPlacement(lines, {}, poses, { 0.5, 0.1 })[0];
+  const std::vector<double> result = PlacementConfidences(lines, {}, poses, { 0.5, 0.1 })[0];
   EXPECT_EQ(result[3], PlacementConfidence(signs[0]));
   EXPECT_EQ(result[20], PlacementConfidence(signs[0])); // where they meet: the first
   EXPECT_EQ(result[40], PlacementConfidence(signs[1]));
@@ -140,10 +140,10 @@ TEST(BranchPlacement, WhatWasNotTrackedIsAsSureAsItsDeviationTells)
 {
   const Polylines lines = TwoLines();
   PoseSequence poses = AtRest(lines);
-  const double sure = PlacementConfidences(lines, {}, poses, 0, { 0.5, 0.1 })[40];
+  const double sure = PlacementConfidences(lines, {}, poses, { 0.5, 0.1 })[0][40];
   poses.status[0].assign(lines.points.size(), TrackingStatus::Filled);
   const std::vector<double> deviations(lines.points.size(), 2.0);
-  EXPECT_NEAR(PlacementConfidences(lines, {}, poses, 0, { 0.5, 0.1 }, deviations)[40],
+  EXPECT_NEAR(PlacementConfidences(lines, {}, poses, { 0.5, 0.1 }, { deviations })[0][40],
     sure * ConfidenceOfDeviation(2.0), 1e-12);
 }
 
@@ -161,11 +161,11 @@ TEST(BranchPlacement, RefusesOtherLines)
   const Polylines lines = TwoLines();
   PoseSequence poses = AtRest(lines);
   poses.status.clear();
-  EXPECT_THROW(SignsOfPlacement(lines, {}, poses, 0, { 0.5, 0.1 }), std::invalid_argument);
+  EXPECT_THROW(SignsOfPlacement(lines, {}, poses, { 0.5, 0.1 }), std::invalid_argument);
   poses = AtRest(lines);
   poses.status[0].pop_back();
-  EXPECT_THROW(SignsOfPlacement(lines, {}, poses, 0, { 0.5, 0.1 }), std::invalid_argument);
+  EXPECT_THROW(SignsOfPlacement(lines, {}, poses, { 0.5, 0.1 }), std::invalid_argument);
   EXPECT_THROW(
-    SignsOfPlacement(lines, { 1.0 }, AtRest(lines), 0, { 0.5, 0.1 }), std::invalid_argument);
+    SignsOfPlacement(lines, { 1.0 }, AtRest(lines), { 0.5, 0.1 }), std::invalid_argument);
 }
 }

@@ -33,7 +33,7 @@ namespace
 using namespace coronary;
 namespace names = vtkCoronaryArrayNames;
 
-constexpr double SameMoment = 1e-4;   // of R-R
+constexpr double SameTime = 1e-4;     // of R-R
 constexpr double MinimumLength = 5.0; // mm, of branches that are judged
 
 class Series
@@ -49,7 +49,7 @@ public:
   {
     for (const TimedFile& file : this->Files)
     {
-      if (CyclicDistance(file.time, time) < SameMoment)
+      if (CyclicDistance(file.time, time) < SameTime)
       {
         return ReadPolyData(file.path, this->Messages);
       }
@@ -176,11 +176,11 @@ void Judge(const std::string& run, const std::string& truth, const std::string& 
   VesselTree tree;
   vtkCoronary::AddPointValues(first, tree);
   const PoseSequence poses = PosesOf(found, times);
+  const std::vector<std::vector<PlacementSigns>> signs =
+    SignsOfPlacement(rest, tree.confidence, poses, timing);
   for (std::size_t k = 0; k < times.size(); ++k)
   {
     const Polylines truly = LinesOf(real.At(times[k]));
-    const std::vector<PlacementSigns> signs =
-      SignsOfPlacement(rest, tree.confidence, poses, k, timing);
     for (std::size_t l = 0; l < rest.lines.size(); ++l)
     {
       const std::vector<std::int64_t>& line = rest.lines[l];
@@ -191,8 +191,8 @@ void Judge(const std::string& run, const std::string& truth, const std::string& 
       const bool placed = MeanDistance(line, poses.points[k], truly) <= limit;
       const Vector3& middle = rest.points[line[line.size() / 2]];
       std::printf("%s,%s,%d,1,%.4f,%.1f,%.1f,%.1f", condition.c_str(), seed.c_str(), placed ? 1 : 0,
-        PlacementConfidence(signs[l]), middle[0], middle[1], middle[2]);
-      for (const double value : signs[l].Values())
+        PlacementConfidence(signs[k][l]), middle[0], middle[1], middle[2]);
+      for (const double value : signs[k][l].Values())
       {
         std::printf(",%.4f", value);
       }
