@@ -1,6 +1,6 @@
 /**
  * @file NrrdText.h
- * @brief Parts of the header of a NRRD file that is written.
+ * @brief Parts of the header of a NRRD file that is written. Not installed.
  */
 #ifndef DynamicCoronary_NrrdText_h
 #define DynamicCoronary_NrrdText_h
