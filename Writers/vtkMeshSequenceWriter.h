@@ -4,7 +4,7 @@
  *
  * All phases have the same points, elements, boundary triangles and ids. That is checked, not assumed.
  * Beside the meshes stands how good their elements are at every phase: inverted and poor tetrahedra,
- * least volume and angle, radius-edge ratio, total volume, surface area. See docs/sequence-export.md.
+ * least volume and angle, radius-edge ratio, total volume, surface area. See docs/exchange.md.
  *
  * @par Input ports:
  * - 0: vtkUnstructuredGrid of tetrahedra, or vtkPolyData of triangles, with time; usually

@@ -19,7 +19,7 @@ import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 # The page of a program; the commands of coronary-pipeline have a section each.
-PAGES = {"coronary-simulator": "docs/simulator-files.md", "coronary-posing": "docs/posing.md",
+PAGES = {"coronary-simulator": "docs/simulator-files.md", "coronary-posing": "docs/deformation.md",
          "coronary-device-emulator": "docs/device-protocol.md"}
 COMMANDS_PAGE = "docs/programs.md"
 KNOWN = ("coronary-pipeline", *PAGES)

@@ -2,7 +2,7 @@
  * @file vtkPosingModel.h
  * @brief A coronary tree that is posed by its joints: what the posing window edits, without the window.
  *
- * The work is done by vtkSkeletonPose and vtkSkinDeformation. docs/posing.md says how it is used.
+ * The work is done by vtkSkeletonPose and vtkSkinDeformation. docs/deformation.md says how it is used.
  */
 #ifndef vtkPosingModel_h
 #define vtkPosingModel_h

@@ -5,7 +5,7 @@
  * Merges points, leaves out degenerate, doubled and small parts, cuts open where the surface is not a
  * manifold, orients outwards, joins open ends that face each other, fills holes, closes open vessel
  * ends by flat caps, takes out triangles that cut others, and betters thin triangles. See
- * docs/cleaning.md.
+ * docs/surface.md.
  *
  * @par Input:
  * vtkPolyData with polygons or strips; lines and vertices are left out. Cell data `CellEntityIds`

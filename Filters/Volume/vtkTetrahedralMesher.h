@@ -4,7 +4,7 @@
  *
  * Constrained Delaunay tetrahedralization by TetGen, or Delaunay refinement by CGAL, each in a
  * process of its own that can crash, hang or leave without harm. The worst tetrahedra are improved
- * afterwards. See docs/volume.md.
+ * afterwards. See docs/surface.md.
  *
  * @par Input ports:
  * - 0: vtkPolyData, one or more closed surfaces of triangles. Cell data `CellEntityIds` (optional;
