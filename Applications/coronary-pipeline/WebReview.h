@@ -3,7 +3,7 @@
  * @brief The report of an evaluation, or of a run: one HTML file in which the beating model is turned and compared.
  *
  * The page needs no other file and no network. Its shapes are numbers: positions of 16 bits in the box around all
- * phases, distances of 16 bits, both as differences that deflate well. docs/evaluation.md has the form.
+ * phases, distances of 16 bits, both as differences that deflate well.
  */
 #ifndef DynamicCoronary_WebReview_h
 #define DynamicCoronary_WebReview_h
