@@ -19,6 +19,15 @@ constexpr std::size_t Deepest = 32; // VTK's own files have 7, SimVascular's 6
 // Expat looks again at a tag that is longer than what it was given, and copies what it is given.
 constexpr std::size_t Block = std::size_t(16) << 20;
 
+// Where expat is in what it was given, and the length of what it found there; 2.9 has other names for them.
+#if XML_MAJOR_VERSION > 2 || XML_MINOR_VERSION >= 9
+constexpr auto CurrentByte = &XML_GetCurrentByteIndex64;
+constexpr auto CurrentBytes = &XML_GetCurrentByteCount64;
+#else
+constexpr auto CurrentByte = &XML_GetCurrentByteIndex;
+constexpr auto CurrentBytes = &XML_GetCurrentByteCount;
+#endif
+
 [[noreturn]] void FailAt(
   std::string_view text, std::size_t byte, const std::string& file, const std::string& what)
 {
@@ -99,8 +108,8 @@ private:
   /// The byte of the text that expat is at.
   std::size_t Place() const
   {
-    const XML_Index index = XML_GetCurrentByteIndex(this->Parser.get());
-    return this->Root + static_cast<std::size_t>(std::max<XML_Index>(0, index));
+    const auto index = CurrentByte(this->Parser.get());
+    return this->Root + (index > 0 ? static_cast<std::size_t>(index) : 0);
   }
 
   template <typename Work>
@@ -152,8 +161,7 @@ private:
       element.attributes.emplace(attributes[0], attributes[1]);
     }
     element.begin = this->Place();
-    element.end =
-      element.begin + static_cast<std::size_t>(XML_GetCurrentByteCount(this->Parser.get()));
+    element.end = element.begin + static_cast<std::size_t>(CurrentBytes(this->Parser.get()));
     if (this->Lengths.size() > Deepest)
     {
       element.Fail("has more than " + std::to_string(Deepest) + " elements in each other");

@@ -1,5 +1,7 @@
 #include "coronaryFrameGuard.h"
 
+#include "coronaryQt.h"
+
 #include <pqAnimationManager.h>
 #include <pqAnimationScene.h>
 #include <pqPVApplicationCore.h>
@@ -8,31 +10,6 @@
 #include <vtkSMProxy.h>
 
 #include <QApplication>
-#include <QKeyEvent>
-#include <QMouseEvent>
-#include <QWheelEvent>
-
-namespace
-{
-/// Of what the user does; null: nothing of that.
-std::unique_ptr<QEvent> Copy(const QEvent& event)
-{
-  switch (event.type())
-  {
-    case QEvent::MouseButtonPress:
-    case QEvent::MouseButtonRelease:
-    case QEvent::MouseButtonDblClick:
-      return std::make_unique<QMouseEvent>(static_cast<const QMouseEvent&>(event));
-    case QEvent::KeyPress:
-    case QEvent::KeyRelease:
-      return std::make_unique<QKeyEvent>(static_cast<const QKeyEvent&>(event));
-    case QEvent::Wheel:
-      return std::make_unique<QWheelEvent>(static_cast<const QWheelEvent&>(event));
-    default:
-      return nullptr;
-  }
-}
-}
 
 coronaryFrameGuard::coronaryFrameGuard(QObject* parent)
   : QObject(parent)
@@ -133,7 +110,8 @@ bool coronaryFrameGuard::eventFilter(QObject* receiver, QEvent* event)
     return true;
   }
   // Windows hand on to their widgets.
-  std::unique_ptr<QEvent> copy = receiver->isWindowType() ? Copy(*event) : nullptr;
+  std::unique_ptr<QEvent> copy =
+    receiver->isWindowType() ? coronaryQt::CopyOfInput(*event) : nullptr;
   if (!copy)
   {
     return false;

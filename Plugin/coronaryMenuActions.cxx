@@ -1,15 +1,14 @@
 #include "coronaryMenuActions.h"
 
 #include "coronaryBuild.h"
+#include "coronaryQt.h"
 
 #include <pqPVApplicationCore.h>
 #include <pqPythonManager.h>
 
-#include <QAction>
 #include <QByteArray>
 #include <QMenu>
 #include <QTimer>
-#include <QWidget>
 
 coronaryMenuActions::coronaryMenuActions(QObject* parent)
   : QActionGroup(parent)
@@ -21,7 +20,7 @@ coronaryMenuActions::coronaryMenuActions(QObject* parent)
     {
       if (!this->Build)
       {
-        QWidget* menu = build->associatedWidgets().value(0);
+        QWidget* menu = coronaryQt::WidgetsOf(*build).value(0);
         this->Build = new coronaryBuild(menu ? menu->parentWidget()->window() : nullptr);
       }
       this->Build->show();
@@ -79,7 +78,7 @@ void coronaryMenuActions::Add(
 void coronaryMenuActions::NameMenu()
 {
   // ParaView makes the menu, once there is a window, and gives it no name: recorded tests need one.
-  for (QWidget* widget : this->actions().first()->associatedWidgets())
+  for (QWidget* widget : coronaryQt::WidgetsOf(*this->actions().first()))
   {
     if (qobject_cast<QMenu*>(widget))
     {

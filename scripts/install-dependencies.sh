@@ -15,32 +15,60 @@ Runs as root, or through sudo. Run again, it changes nothing.
 EOF
 }
 
+# What differs between the systems. DYNAMICCORONARY_SUITE names another one, for --check.
+suite="${DYNAMICCORONARY_SUITE:-$(sed -n 's/^VERSION_CODENAME=//p' /etc/os-release 2>/dev/null || true)}"
+known="Debian 12 (bookworm), 13 (trixie) and unstable (forky), and Ubuntu 24.04 (noble)"
+tetgen=libtet1.5-dev
+qt5=(libqt5svg5 libqt5opengl5-dev qttools5-dev qtxmlpatterns5-dev-tools)
+qt6=(libqt6svg6 qt6-base-dev qt6-5compat-dev qt6-tools-dev libpython3-dev)
+# VTK can not be installed beside python3-paraview where ParaView brings its own: scripts/vtk-prefix.sh unpacks it into a
+# folder of its own, and these are what its libraries load.
+vtk=(libpython3-dev libtbb-dev libjsoncpp-dev libdouble-conversion3 libexpat1 liblz4-1 liblzma5 libtiff6 patchelf)
+browser=(chromium nodejs)
+clang=(clang clang-tidy libclang-rt-dev)
+vtk_alone=yes
+case "$suite" in
+  bookworm)
+    qt=("${qt5[@]}")
+    vtk+=(libjpeg62-turbo libopenmpi3 libpng16-16)
+    clang=(clang clang-tidy-14 libclang-rt-14-dev)
+    browser+=(clang-format-14)
+    ;;
+  trixie)
+    qt=("${qt6[@]}")
+    vtk+=(libjpeg62-turbo libopenmpi40 libpng16-16t64)
+    ;;
+  forky | sid)
+    qt=("${qt6[@]}" libvtk9-dev libvtk9-qt-dev xsltproc)
+    vtk=(libvtk9-dev python3-vtk9 libpython3-dev)
+    tetgen=libtet-dev
+    vtk_alone=no
+    ;;
+  noble)
+    qt=("${qt5[@]}")
+    vtk+=(libjpeg-turbo8 libopenmpi3t64 libpng16-16t64)
+    # Ubuntu has the browser as a snap only.
+    browser=(nodejs)
+    ;;
+  *)
+    qt=()
+    ;;
+esac
+
 common=(
   g++ cmake ninja-build ccache mold
-  libeigen3-dev libsuitesparse-dev libgdcm-dev zlib1g-dev libexpat1-dev nlohmann-json3-dev libcli11-dev libtet1.5-dev
+  libeigen3-dev libsuitesparse-dev libgdcm-dev zlib1g-dev libexpat1-dev nlohmann-json3-dev libcli11-dev "$tetgen"
   libcgal-dev libxrl-dev
   libfreetype-dev libgif-dev libglew-dev libx11-dev
   xvfb xauth
   dpkg-dev file python3
   pkg-config libevdev-dev libopenigtlink-dev
 )
-paraview=(
-  paraview-dev python3-paraview
-  libopenmpi-dev libdouble-conversion-dev libqt5svg5 libqt5opengl5-dev qttools5-dev qtxmlpatterns5-dev-tools
-)
-# VTK 9.1 itself can not be installed beside python3-paraview: scripts/vtk-prefix.sh unpacks it
-# into a folder of its own, and these are what its libraries load.
-vtk=(
-  libtbb-dev libjsoncpp-dev libdouble-conversion3 libexpat1 libjpeg62-turbo liblz4-1 liblzma5 libopenmpi3
-  libpng16-16 libtiff6 patchelf
-)
-# For tests; without those of the second line some are skipped.
-tests=(
-  libgtest-dev clang-format-14
-  chromium nodejs curl ca-certificates plastimatch
-)
+paraview=(paraview-dev python3-paraview libopenmpi-dev libdouble-conversion-dev "${qt[@]}")
+# For tests; without those after the first some are skipped.
+tests=(libgtest-dev "${browser[@]}" curl ca-certificates plastimatch python3-nbconvert python3-ipykernel python3-matplotlib)
 nightly=(libbenchmark-dev libinsighttoolkit5-dev elastix)
-developer=(clang libclang-rt-14-dev valgrind heaptrack clang-tidy-14 shellcheck)
+developer=("${clang[@]}" valgrind heaptrack shellcheck)
 
 check_only=no
 tree=all
@@ -90,10 +118,12 @@ if [ "$with_developer" = yes ]; then
   wanted+=("${developer[@]}")
 fi
 
-if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
+mapfile -t wanted < <(printf '%s\n' "${wanted[@]}" | awk '!seen[$0]++')
+
+if [ ${#qt[@]} -eq 0 ] || ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
   {
-    echo "install-dependencies: this script needs Debian's apt-get and dpkg-query."
-    echo "On another system install the counterparts of: ${wanted[*]}"
+    echo "install-dependencies: '${suite:-a system without a name}' is not known here: $known are. Install the counterparts of:" \
+      "${wanted[*]} (and Qt's development files)."
   } >&2
   exit 1
 fi
@@ -118,7 +148,7 @@ if [ ${#missing[@]} -eq 0 ]; then
   exit 0
 fi
 # apt would remove what others work with, or stop with a page of reasons.
-if [[ " ${missing[*]} " == *" python3-paraview "* ]] && is_installed python3-vtk9; then
+if [ "$vtk_alone" = yes ] && [[ " ${missing[*]} " == *" python3-paraview "* ]] && is_installed python3-vtk9; then
   echo "install-dependencies: python3-paraview, which is needed, and python3-vtk9, which is installed, exclude each other" \
     "in Debian: remove python3-vtk9 (apt-get remove python3-vtk9), or build without ParaView (--tree vtk)." >&2
   exit 1
@@ -143,10 +173,6 @@ if [ "$(id -u)" -ne 0 ]; then
       exit 1
     fi
   fi
-fi
-
-if ! grep -qs '^VERSION_CODENAME=bookworm$' /etc/os-release; then
-  echo "install-dependencies: made for Debian 12 (bookworm); going on, names may differ here." >&2
 fi
 
 apt_options=(-o DPkg::Lock::Timeout=300 -o Acquire::Retries=3)

@@ -107,7 +107,7 @@ void Request::Run() const
   }
 #else
   throw coronary::UsageError(
-    "--headless is required: this program was built without its window (Qt5 and VTK's "
+    "--headless is required: this program was built without its window (Qt and VTK's "
     "GUISupportQt were not found)");
 #endif
 }

@@ -435,8 +435,8 @@ bool Window::TakeEvent(QEvent& event)
 bool Window::TakeMouse(QMouseEvent& event)
 {
   const double ratio = this->Picture->devicePixelRatioF();
-  const double x = ratio * event.x();
-  const double y = ratio * (this->Picture->height() - 1 - event.y());
+  const double x = ratio * event.pos().x();
+  const double y = ratio * (this->Picture->height() - 1 - event.pos().y());
   if (event.type() == QEvent::MouseButtonPress && event.button() == Qt::LeftButton)
   {
     this->Picture->setFocus();

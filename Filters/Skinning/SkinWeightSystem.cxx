@@ -553,7 +553,6 @@ void SampleBones(const SkinWeightInput& input, const ScaledMesh& mesh, const Spa
     {
       jointSample(input.bones[b].second, 1.0);
     }
-    double inside = 0.0;
     for (std::size_t gap = 0; gap <= pointsOf[b].size(); ++gap)
     {
       const double low = gap == 0 ? 0.0 : pointsOf[b][gap - 1].along;
@@ -571,11 +570,7 @@ void SampleBones(const SkinWeightInput& input, const ScaledMesh& mesh, const Spa
       {
         const double along = low + (high - low) * (i + 0.5) / parts;
         const double part = (high - low) * length / parts;
-        if (sample(along, part, { { static_cast<std::int32_t>(b), 1.0 } }) > 0.0)
-        {
-          inside += part;
-        }
-        else
+        if (!(sample(along, part, { { static_cast<std::int32_t>(b), 1.0 } }) > 0.0))
         {
           system.lengthOutside[b] += part * mesh.unit;
         }

@@ -188,7 +188,7 @@ void Request::Run() const
   this->RunWindow();
 #else
   throw coronary::UsageError(
-    "--headless is required: this program was built without its window (Qt5 and VTK's "
+    "--headless is required: this program was built without its window (Qt and VTK's "
     "GUISupportQt were not found)");
 #endif
 }
