@@ -390,6 +390,7 @@ class Pages:
         """How the class is reached."""
         rows = ["| in | as |", "|---|---|", "| C++ | `#include <DynamicCoronary/%s.h>`, module `%s` |" % (
             header.name, "DynamicCoronary::Coronary" + header.folder.split("/")[-1])]
+        rows.append("| [Python](../python.md) | `from dynamiccoronary import %s` |" % header.name)
         for proxy in proxies:
             if proxy.group == "writers":
                 rows.append("| ParaView | *%s*: *File > Save Data*; `SaveData` in Python |" % proxy.label)

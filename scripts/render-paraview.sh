@@ -16,7 +16,7 @@ if [ $# -lt 1 ] || [ $# -gt 2 ]; then
   exit 2
 fi
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
-plugin="${PLUGIN:-$root/build/paraview/lib/paraview-5.11/plugins/DynamicCoronaryPlugin}"
+plugin="${PLUGIN:-$(echo "$root"/build/paraview/lib/paraview-*/plugins/DynamicCoronaryPlugin)}"
 mkdir -p "$1"
 work="$(mktemp -d)"
 PICTURES="$(cd "$1" && pwd)"
