@@ -61,19 +61,7 @@ std::vector<Vector3> LineTracker::PlacesAt(const std::vector<Vector3>& displacem
 
 Matrix3 LineTracker::Turn(int node, const std::vector<Vector3>& displacement) const
 {
-  // The tangent's change by the displacements of the neighbours.
-  const int parent = this->Nodes.parent[node];
-  if (parent < 0)
-  {
-    return Matrix3::Identity();
-  }
-  const Vector3 rest = this->Nodes.position[node] - this->Nodes.position[parent];
-  const Vector3 moved = rest + displacement[node] - displacement[parent];
-  if (rest.norm() < 1e-6 || moved.norm() < 1e-6)
-  {
-    return Matrix3::Identity();
-  }
-  return Eigen::Quaterniond::FromTwoVectors(rest, moved).toRotationMatrix();
+  return RotationOf(this->Deformation.At(node, displacement));
 }
 
 std::vector<Vector3> LineTracker::Smear(int node, double time) const

@@ -7,7 +7,9 @@
 
 #include "CenterlineTracking.h"
 #include "CyclicTime.h"
+#include "DisplacementLabels.h"
 #include "LineNodes.h"
+#include "LocalDeformation.h"
 #include "MotionFilling.h"
 #include "PatchMatching.h"
 #include "SparseVolume.h"
@@ -50,6 +52,7 @@ public:
     , Progress(progress)
     , Sharing(sharing)
     , Nodes(PlaceNodes(lines, settings.nodeSpacing))
+    , Deformation(this->Nodes)
     , Coarse(settings.coarseRadius, settings.coarseSpacing)
     , CoarseVessel(CoarseVesselRadius, settings.coarseSpacing)
     , Fine(settings.fineRadius, 1.0)
@@ -71,6 +74,12 @@ private:
     std::vector<Eigen::Vector3f> gradient;
     std::vector<float> weight;
   };
+  /// What the first search compares with.
+  struct CoarseReference
+  {
+    AveragedVolume image;
+    std::vector<std::vector<float>> weights; ///< per node, of Coarse
+  };
   /// Of a node's widening at a phase, and what it is worth.
   struct Widening
   {
@@ -87,6 +96,10 @@ private:
   /// Air and bone would outvote the rest. @param values  of the reference around all nodes
   void LimitValues(std::vector<float> values);
   void SearchCoarsely();
+  /// Per node, what an image says of all shifts from the guess, when the reference is deformed like `places`.
+  std::vector<std::vector<float>> CoarseCosts(const CoarseReference& reference,
+    const AveragedVolume& moved, const LabelLattice& lattice, const std::vector<Vector3>& guess,
+    const std::vector<Vector3>& places, const ProgressCallback& progress) const;
   /// Outwards from the reference, so that a neighbour in time is known.
   void SortPhases();
   /// Positions in Order, each of the phase whose place is the guess of the one at this position; none: -1.
@@ -137,7 +150,7 @@ private:
   }
   /// How far the node moves from its place at `time` over the window, at even moments of it.
   std::vector<Vector3> Smear(int node, double time) const;
-  /// The rotation from the reference to the phase, without a twist about the vessel.
+  /// The rotation from the reference to the phase of what is around the node.
   Matrix3 Turn(int node, const std::vector<Vector3>& displacement) const;
   std::vector<Vector3> PlacesAt(const std::vector<Vector3>& displacement) const;
 
@@ -151,6 +164,7 @@ private:
   ItemSharing& Sharing;
 
   LineNodes Nodes;
+  LocalDeformation Deformation;
   Patch Coarse;
   Patch CoarseVessel;
   Patch Fine;

@@ -1,6 +1,6 @@
 #include "LineTracker.h"
 
-#include "DisplacementLabels.h"
+#include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
@@ -20,18 +20,18 @@ constexpr double CoarseTissueLimit = 2.0;
 constexpr double CoarseLimit = 20.0;
 /// How far a vessel moves between phases that are neighbours in time: one standard deviation along each axis, mm.
 constexpr double UsualStep = 8.0;
+/// The reference is deformed as the phase before was found, then as this one was.
+constexpr int CoarseRounds = 2;
 
-/// Of the patch around every place.
-std::vector<std::vector<float>> ValuesAround(
-  const std::vector<Vector3>& places, const Patch& patch, const AveragedVolume& volume)
+/// Of the patch around a place of the reference, whose offsets are turned and stretched back.
+std::vector<float> ValuesAround(const Vector3& place, const Matrix3& back, const Patch& patch,
+  const AveragedVolume& volume, const ValueWindow& limits)
 {
-  std::vector<std::vector<float>> values(places.size());
-  for (std::size_t n = 0; n < places.size(); ++n)
+  std::vector<float> values;
+  values.reserve(patch.places.size());
+  for (std::size_t p = 0; p < patch.places.size(); ++p)
   {
-    for (std::size_t p = 0; p < patch.places.size(); ++p)
-    {
-      values[n].push_back(volume.Sample(places[n] + patch.Offset(p)));
-    }
+    values.push_back(limits(volume.Sample(place + back * patch.Offset(p))));
   }
   return values;
 }
@@ -82,6 +82,62 @@ void LineTracker::LimitValues(std::vector<float> all)
   this->Limits = { median - spread, median + spread };
 }
 
+std::vector<std::vector<float>> LineTracker::CoarseCosts(const CoarseReference& reference,
+  const AveragedVolume& moved, const LabelLattice& lattice, const std::vector<Vector3>& guess,
+  const std::vector<Vector3>& places, const ProgressCallback& progress) const
+{
+  const auto nodes = static_cast<std::int64_t>(this->Nodes.size());
+  const int blockReach = std::max(this->Coarse.reach, this->CoarseVessel.reach) + lattice.reach;
+  const int blockSide = 2 * blockReach + 1;
+  std::vector<std::vector<float>> costs(nodes);
+  std::vector<std::vector<float>> ofVessels(nodes);
+  ParallelFor(
+    nodes, 4,
+    [&](std::int64_t first, std::int64_t last)
+    {
+      std::vector<float> block(static_cast<std::size_t>(blockSide) * blockSide * blockSide);
+      for (std::int64_t n = first; n < last; ++n)
+      {
+        const Vector3 centre = this->Nodes.position[n] + guess[n];
+        const Matrix3 back = this->Deformation.At(static_cast<int>(n), places).inverse();
+        std::size_t at = 0;
+        for (int k = -blockReach; k <= blockReach; ++k)
+        {
+          for (int j = -blockReach; j <= blockReach; ++j)
+          {
+            for (int i = -blockReach; i <= blockReach; ++i)
+            {
+              block[at++] = this->Limits(moved.Sample(centre + lattice.step * Vector3(i, j, k)));
+            }
+          }
+        }
+        SumsOfSquares(block, blockSide, this->Coarse, reference.weights[n],
+          ValuesAround(this->Nodes.position[n], back, this->Coarse, reference.image, this->Limits),
+          lattice.reach, costs[n]);
+        if (this->Settings.tissue)
+        {
+          SumsOfSquares(block, blockSide, this->CoarseVessel, this->CoarseVessel.weights,
+            ValuesAround(
+              this->Nodes.position[n], back, this->CoarseVessel, reference.image, this->Limits),
+            lattice.reach, ofVessels[n]);
+        }
+      }
+    },
+    progress);
+  ToLikelihoods(
+    costs, 30.0, this->Settings.tissue ? CoarseTissueLimit : CoarseLimit, 0.1 * this->NoiseFloor());
+  if (this->Settings.tissue)
+  {
+    ToLikelihoods(ofVessels, 10.0, CoarseLimit, 0.1 * this->NoiseFloor());
+    for (std::int64_t n = 0; n < nodes; ++n)
+    {
+      std::transform(
+        costs[n].begin(), costs[n].end(), ofVessels[n].begin(), costs[n].begin(), std::plus<>());
+    }
+  }
+  return costs;
+}
+
 void LineTracker::SearchCoarsely()
 {
   const std::size_t phases = this->Times.size();
@@ -89,40 +145,30 @@ void LineTracker::SearchCoarsely()
   const LabelLattice lattice{ static_cast<int>(std::ceil(
                                 this->Settings.captureRange / this->Settings.coarseSpacing)),
     this->Settings.coarseSpacing };
-  const int blockReach = std::max(this->Coarse.reach, this->CoarseVessel.reach) + lattice.reach;
-  const int blockSide = 2 * blockReach + 1;
-
   this->PlaceBox();
 
   // The reference.
-  AveragedVolume averaged;
+  CoarseReference reference;
   {
     const ScalarImage image = this->Read(this->ReferenceTime);
     this->Voxel = image.grid.spacing.maxCoeff();
-    averaged = AverageBlocks(image, this->Settings.coarseSpacing, this->Low, this->High);
+    reference.image = AverageBlocks(image, this->Settings.coarseSpacing, this->Low, this->High);
     this->Reference = SparseVolume(image, this->Nodes.position, this->Keep());
   }
   this->MeasureContrast();
-  const std::vector<std::vector<float>> weights = this->Settings.tissue
+  reference.weights = this->Settings.tissue
     ? this->WithoutVessels(this->Coarse, 0.5 * this->Settings.coarseSpacing)
     : std::vector<std::vector<float>>(nodes, this->Coarse.weights);
-  std::vector<std::vector<float>> wanted =
-    ValuesAround(this->Nodes.position, this->Coarse, averaged);
-  std::vector<std::vector<float>> wantedVessel =
-    ValuesAround(this->Nodes.position, this->CoarseVessel, averaged);
   std::vector<float> all;
-  for (const std::vector<float>& one : wanted)
+  constexpr ValueWindow any{ std::numeric_limits<float>::lowest(),
+    std::numeric_limits<float>::max() };
+  for (const Vector3& place : this->Nodes.position)
   {
-    all.insert(all.end(), one.begin(), one.end());
+    const std::vector<float> own =
+      ValuesAround(place, Matrix3::Identity(), this->Coarse, reference.image, any);
+    all.insert(all.end(), own.begin(), own.end());
   }
   this->LimitValues(std::move(all));
-  for (std::vector<std::vector<float>>* values : { &wanted, &wantedVessel })
-  {
-    for (std::vector<float>& one : *values)
-    {
-      std::transform(one.begin(), one.end(), one.begin(), this->Limits);
-    }
-  }
 
   this->SortPhases();
   const std::vector<std::ptrdiff_t> guesses = this->Guesses();
@@ -135,54 +181,21 @@ void LineTracker::SearchCoarsely()
     std::vector<Vector3> places = guesses[position] < 0
       ? std::vector<Vector3>(nodes, Vector3::Zero())
       : this->Displacement[this->Order[static_cast<std::size_t>(guesses[position])]];
-    std::vector<std::vector<float>> costs(nodes);
-    std::vector<std::vector<float>> ofVessels(nodes);
-    ParallelFor(
-      nodes, 4,
-      [&](std::int64_t first, std::int64_t last)
-      {
-        std::vector<float> block(static_cast<std::size_t>(blockSide) * blockSide * blockSide);
-        for (std::int64_t n = first; n < last; ++n)
-        {
-          const Vector3 centre = this->Nodes.position[n] + places[n];
-          std::size_t at = 0;
-          for (int k = -blockReach; k <= blockReach; ++k)
-          {
-            for (int j = -blockReach; j <= blockReach; ++j)
-            {
-              for (int i = -blockReach; i <= blockReach; ++i)
-              {
-                block[at++] = this->Limits(moved.Sample(centre + lattice.step * Vector3(i, j, k)));
-              }
-            }
-          }
-          SumsOfSquares(
-            block, blockSide, this->Coarse, weights[n], wanted[n], lattice.reach, costs[n]);
-          if (this->Settings.tissue)
-          {
-            SumsOfSquares(block, blockSide, this->CoarseVessel, this->CoarseVessel.weights,
-              wantedVessel[n], lattice.reach, ofVessels[n]);
-          }
-        }
-      },
-      this->Part(0.6 * (static_cast<double>(position) + 0.3) / static_cast<double>(phases),
-        0.6 * static_cast<double>(position + 1) / static_cast<double>(phases)));
-    ToLikelihoods(costs, 30.0, this->Settings.tissue ? CoarseTissueLimit : CoarseLimit,
-      0.1 * this->NoiseFloor());
-    if (this->Settings.tissue)
+    const std::vector<Vector3> guess = places;
+    for (int round = 0; round < CoarseRounds; ++round)
     {
-      ToLikelihoods(ofVessels, 10.0, CoarseLimit, 0.1 * this->NoiseFloor());
+      std::vector<std::vector<float>> costs = this->CoarseCosts(reference, moved, lattice, guess,
+        places,
+        this->Part(
+          0.6 * (static_cast<double>(position) + 0.3 + 0.35 * round) / static_cast<double>(phases),
+          0.6 * (static_cast<double>(position) + 0.65 + 0.35 * round) /
+            static_cast<double>(phases)));
+      PreferShort(lattice, costs);
+      const std::vector<Vector3> best = BestDisplacements(this->Nodes, lattice, costs, 0.5);
       for (std::int64_t n = 0; n < nodes; ++n)
       {
-        std::transform(
-          costs[n].begin(), costs[n].end(), ofVessels[n].begin(), costs[n].begin(), std::plus<>());
+        places[n] = guess[n] + best[n];
       }
-    }
-    PreferShort(lattice, costs);
-    const std::vector<Vector3> best = BestDisplacements(this->Nodes, lattice, costs, 0.5);
-    for (std::int64_t n = 0; n < nodes; ++n)
-    {
-      places[n] += best[n];
     }
     this->Volumes[phase] = SparseVolume(image, this->PlacesAt(places), this->Keep());
     return places;

@@ -62,6 +62,51 @@ Eigen::MatrixXd Monomials(const std::vector<Vector3>& positions, int degree)
 
 using Measurements = std::vector<std::vector<TrajectoryMeasurement>>;
 
+/// Precision of the change of the coefficients from a node to its parent.
+class Coupling
+{
+public:
+  Coupling(const LineNodes& nodes, int node, const TrajectoryPrior& prior)
+    : Decay(prior.neighbourDecay)
+  {
+    const Vector3 way = nodes.position[node] - nodes.position[nodes.parent[node]];
+    const Vector3 along = way.norm() > 1e-6 ? Vector3(way.normalized()) : nodes.tangent[node];
+    const double bend = 1.0 / (prior.neighbourChange * prior.neighbourChange);
+    const double stretch = 1.0 / (prior.neighbourStretch * prior.neighbourStretch);
+    this->First = (bend * Matrix3::Identity() + (stretch - bend) * along * along.transpose()) /
+      nodes.step[node];
+  }
+
+  /// Of three coefficients of one harmonic.
+  Matrix3 Of(Eigen::Index basis) const
+  {
+    return std::pow(std::max(1, Harmonic(basis)), 2.0 * this->Decay) * this->First;
+  }
+
+  /// The product with a column of all coefficients or more.
+  Eigen::MatrixXd Times(const Eigen::MatrixXd& columns) const
+  {
+    Eigen::MatrixXd result(columns.rows(), columns.cols());
+    for (Eigen::Index b = 0; 3 * b < columns.rows(); ++b)
+    {
+      result.middleRows<3>(3 * b).noalias() = this->Of(b) * columns.middleRows<3>(3 * b);
+    }
+    return result;
+  }
+
+  void AddTo(Eigen::MatrixXd& matrix) const
+  {
+    for (Eigen::Index b = 0; 3 * b < matrix.rows(); ++b)
+    {
+      matrix.block<3, 3>(3 * b, 3 * b) += this->Of(b);
+    }
+  }
+
+private:
+  double Decay;
+  Matrix3 First;
+};
+
 /// Per node: the common motion's coefficients, basis x 3.
 std::vector<Eigen::MatrixXd> FitCommonMotion(const LineNodes& nodes,
   const std::vector<Eigen::VectorXd>& basis, const Measurements& measurements,
@@ -140,6 +185,7 @@ void TrajectoryPrior::Validate() const
   require.Range("amplitude", this->amplitude, 1e-3, 1e3);
   require.Range("decay", this->decay, 0.0, 4.0);
   require.Range("neighbourChange", this->neighbourChange, 1e-4, 1e2);
+  require.Range("neighbourStretch", this->neighbourStretch, 1e-4, 1e2);
   require.Range("neighbourDecay", this->neighbourDecay, 0.0, 4.0);
   require.Range("commonDegree", this->commonDegree, 0, 4);
   require.Range("commonHarmonics", this->commonHarmonics, 1, 12);
@@ -230,16 +276,12 @@ Trajectories FitTrajectories(const LineNodes& nodes, const std::vector<double>& 
   }
   const Eigen::Index size = 2 * prior.harmonics + 1;
   const Eigen::Index unknowns = 3 * size;
-  // Precisions of the coefficients themselves, and of their change along one mm.
-  Eigen::VectorXd own(unknowns);
-  Eigen::VectorXd change(unknowns);
+  Eigen::VectorXd own(unknowns); // precision of the coefficients themselves
   for (Eigen::Index b = 0; b < size; ++b)
   {
     const double m = std::max(1, Harmonic(b));
     const double sd = prior.amplitude / std::pow(m, prior.decay);
-    const double walk = prior.neighbourChange / std::pow(m, prior.neighbourDecay);
     own.segment<3>(3 * b).setConstant(1.0 / (sd * sd));
-    change.segment<3>(3 * b).setConstant(1.0 / (walk * walk));
   }
 
   std::vector<Eigen::MatrixXd> matrix(count);
@@ -266,21 +308,19 @@ Trajectories FitTrajectories(const LineNodes& nodes, const std::vector<double>& 
         }
       }
     }
-    // Both ends of the step to the parent, and of those to the children below.
-    if (nodes.parent[n] >= 0)
-    {
-      matrix[n].diagonal() += change / nodes.step[n];
-    }
   }
+  // Both ends of the step to the parent.
   for (std::size_t n = 0; n < count; ++n)
   {
     if (nodes.parent[n] >= 0)
     {
-      matrix[nodes.parent[n]].diagonal() += change / nodes.step[n];
+      const Coupling coupling(nodes, static_cast<int>(n), prior);
+      coupling.AddTo(matrix[n]);
+      coupling.AddTo(matrix[nodes.parent[n]]);
     }
   }
 
-  // Tips to roots; the coupling to the parent is -change / step, a diagonal.
+  // Tips to roots; the block of a node and its parent is minus their coupling.
   std::vector<Eigen::LLT<Eigen::MatrixXd>> factor(count);
   for (auto node = nodes.order.rbegin(); node != nodes.order.rend(); ++node)
   {
@@ -289,10 +329,10 @@ Trajectories FitTrajectories(const LineNodes& nodes, const std::vector<double>& 
     const int parent = nodes.parent[n];
     if (parent >= 0)
     {
-      const Eigen::VectorXd coupling = change / nodes.step[n];
-      const Eigen::MatrixXd gain = factor[n].solve(Eigen::MatrixXd(coupling.asDiagonal()));
-      matrix[parent] -= coupling.asDiagonal() * gain;
-      right[parent] += coupling.cwiseProduct(factor[n].solve(right[n]));
+      const Coupling coupling(nodes, n, prior);
+      const Eigen::MatrixXd between = coupling.Times(Eigen::MatrixXd::Identity(unknowns, unknowns));
+      matrix[parent] -= coupling.Times(factor[n].solve(between));
+      right[parent] += coupling.Times(factor[n].solve(right[n]));
     }
   }
   // Roots to tips.
@@ -307,8 +347,8 @@ Trajectories FitTrajectories(const LineNodes& nodes, const std::vector<double>& 
     solution[n] = factor[n].solve(right[n]);
     if (parent >= 0)
     {
-      const Eigen::VectorXd coupling = change / nodes.step[n];
-      const Eigen::MatrixXd gain = result.covariance[n] * coupling.asDiagonal();
+      const Eigen::MatrixXd gain =
+        Coupling(nodes, n, prior).Times(result.covariance[n]).transpose();
       solution[n] += gain * solution[parent];
       result.covariance[n] += gain * result.covariance[parent] * gain.transpose();
     }

@@ -22,9 +22,11 @@ struct TrajectoryPrior
   int harmonics = 6;       ///< of the cycle, 1 to 12
   double amplitude = 15.0; ///< standard deviation of the first harmonic, mm; the m-th: / m^decay
   double decay = 2.0;      ///< 0 to 4
-  double neighbourChange = 0.08; ///< of the first harmonic from node to node, mm per square root of
-                                 ///< mm along the vessel; the m-th: / m^neighbourDecay
-  double neighbourDecay = 1.0;   ///< 0 to 4
+  double neighbourChange =
+    0.2; ///< of the first harmonic from node to node, across the vessel, mm per
+         ///< square root of mm along it; the m-th: / m^neighbourDecay
+  double neighbourStretch = 0.08; ///< the same along the vessel, which bends more than it stretches
+  double neighbourDecay = 1.0;    ///< 0 to 4
 
   int commonDegree = 3;    ///< of the common motion's polynomial, 0 to 4; 0: there is none
   int commonHarmonics = 3; ///< 1 to 12; with more, phases without images would be guessed badly
