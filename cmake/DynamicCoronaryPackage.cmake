@@ -24,7 +24,7 @@ set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA "${CMAKE_CURRENT_LIST_DIR}/debian/trigger
 if(DYNAMICCORONARY_WITH_PARAVIEW)
   set(CPACK_DEBIAN_PACKAGE_DEPENDS "paraview")
   # Icons; pvpython; a display for pictures without a screen.
-  set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "libqt5svg5, python3-paraview, xvfb, xauth")
+  set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "libqt5svg5 | qt6-svg-plugins, python3-paraview, xvfb, xauth")
   set(plugin_list "/usr/${CMAKE_INSTALL_LIBDIR}/${PARAVIEW_PLUGIN_SUBDIR}/dynamiccoronary.plugins.xml")
   configure_file("${CMAKE_CURRENT_LIST_DIR}/debian/postinst.in" "${CMAKE_BINARY_DIR}/debian/postinst" @ONLY)
   configure_file("${CMAKE_CURRENT_LIST_DIR}/debian/prerm.in" "${CMAKE_BINARY_DIR}/debian/prerm" @ONLY)

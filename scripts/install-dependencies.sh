@@ -20,7 +20,7 @@ suite="${DYNAMICCORONARY_SUITE:-$(sed -n 's/^VERSION_CODENAME=//p' /etc/os-relea
 known="Debian 12 (bookworm), 13 (trixie) and unstable (forky), and Ubuntu 24.04 (noble)"
 tetgen=libtet1.5-dev
 qt5=(libqt5svg5 libqt5opengl5-dev qttools5-dev qtxmlpatterns5-dev-tools)
-qt6=(libqt6svg6 qt6-base-dev qt6-5compat-dev qt6-tools-dev libpython3-dev)
+qt6=(qt6-svg-plugins qt6-base-dev qt6-5compat-dev qt6-tools-dev libpython3-dev)
 # VTK can not be installed beside python3-paraview where ParaView brings its own: scripts/vtk-prefix.sh unpacks it into a
 # folder of its own, and these are what its libraries load.
 vtk=(libpython3-dev libtbb-dev libjsoncpp-dev libdouble-conversion3 libexpat1 liblz4-1 liblzma5 libtiff6 patchelf)
