@@ -114,6 +114,8 @@ void WireInGuide::Lay()
 {
   const bool first = !this->Laid;
   this->Laid = true;
+  this->LaidAngle = this->Far;
+  this->CurvedWithin = false;
   for (std::size_t i = 0; i < this->Places.size(); ++i)
   {
     const double behind = static_cast<double>(i) * NodeSpacing;
@@ -123,6 +125,7 @@ void WireInGuide::Lay()
     if (const double curved = this->Curved ? RestCurvature(this->Wire, fromTip) : 0.0;
         curved != 0.0)
     {
+      this->CurvedWithin = this->CurvedWithin || behind >= this->From;
       const double cell = this->Length > 0.0 ? (behind - this->From) / this->Length : 0.0;
       const double angle = this->Cells.empty()
         ? this->Far
@@ -381,7 +384,8 @@ void WireInGuide::Drive(double inserted, double way, double hand, double turned)
   this->Way = way;
   this->Hand = hand;
   this->GuideTurned = turned;
-  if (!this->Laid || std::abs(inserted - this->Inserted) > LayInterval)
+  if (!this->Laid || std::abs(inserted - this->Inserted) > LayInterval ||
+    (this->CurvedWithin && std::abs(this->Far - this->LaidAngle) > LayTurn))
   {
     this->Inserted = inserted;
     this->Lay();

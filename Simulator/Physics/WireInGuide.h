@@ -125,6 +125,8 @@ private:
   /// Across the lumen, from the guide's tip on.
   bool Laid = false;
   double Inserted = 0.0;          ///< that it was laid for, mm
+  double LaidAngle = 0.0;         ///< likewise: of the far end, rad
+  bool CurvedWithin = false;      ///< it is curved at rest in there
   std::vector<Vector2> Curvature; ///< of the guide, 1/mm
   std::vector<Vector2> Places;    ///< mm
   std::vector<Vector2> Bends;     ///< of the guide less those of the wire at rest, 1/mm
