@@ -13,6 +13,7 @@ constexpr double StraightBehind = 40.0; // mm behind the bends, so that the wire
 constexpr double WallStiffness = 60.0;  // N/mm of a node
 constexpr double Ground = 1e-7; // N/mm to the middle: where nothing else says where the wire lies
 constexpr double FirstGround = 1.0; // N/mm, from which it is let down to that
+constexpr int FirstSteps = 8;       // each a tenth of the one before, down to Ground
 constexpr double LayInterval = 0.5; // mm that the wire is advanced before it lies otherwise
 constexpr double LayTurn = 0.1;     // rad, likewise, of a wire that is curved
 constexpr int FirstIterations = 50;
@@ -136,11 +137,13 @@ void WireInGuide::Lay()
       this->Bends[i] -= curved * Across(angle);
     }
   }
-  for (double ground = first ? FirstGround : Ground; ground > 0.99 * Ground; ground *= 0.1)
+  double ground = first ? FirstGround : Ground;
+  for (int step = first ? FirstSteps : 1; step > 0; --step)
   {
     for (int n = first ? FirstIterations : Iterations; n > 0 && this->Relax(ground); --n)
     {
     }
+    ground *= 0.1;
   }
   this->Press();
   this->Couple();

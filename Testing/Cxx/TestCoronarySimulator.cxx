@@ -326,7 +326,7 @@ TEST_F(TestCoronarySimulator, AScriptedWithdrawalResistsThePullAndTheGuideAddsTo
     scenario["catheter"]["friction"] = rubs ? friction : 0.0;
     this->Put("withdrawal.json", scenario);
     ASSERT_EQ(
-      this->Run("--headless --quiet --scenario withdrawal.json --output-rate 400 --output w "
+      this->Run("--headless --quiet --scenario withdrawal.json --output-rate 100 --output w "
                 "--script '" DYNAMICCORONARY_DRIVING "/withdrawal.json'"),
       0)
       << this->Said();
@@ -352,7 +352,7 @@ TEST_F(TestCoronarySimulator, AScriptedWithdrawalResistsThePullAndTheGuideAddsTo
     }
     for (int part = 0; part < 3; ++part)
     {
-      ASSERT_GT(counts[part], 100);
+      ASSERT_GT(counts[part], 25);
       means[rubs][part] /= counts[part];
     }
   }
