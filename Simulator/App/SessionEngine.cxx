@@ -15,9 +15,7 @@ namespace
 {
 using Clock = std::chrono::steady_clock;
 
-constexpr std::uint64_t ForceInterval = 40;  // ticks between recorded forces: 50 Hz at 2 kHz
 constexpr std::uint64_t CommandInterval = 2; // ticks between forces for the hands: 1 kHz at 2 kHz
-constexpr std::size_t MostMessages = 1000;   // that nobody has taken
 constexpr double CatchUp =
   0.05; // s that a busy machine may hold the physics up without losing time
 
@@ -27,12 +25,92 @@ double SecondsSince(Clock::time_point start)
 }
 }
 
+/// Those of the mux, and the heart rates of a script.
+class SessionEngine::HandsSource : public TickSource
+{
+public:
+  HandsSource(std::shared_ptr<DeviceMux> mux, DriveScript script, double tickRate)
+    : Mux(std::move(mux))
+    , Script(std::move(script))
+    , Rate(tickRate)
+  {
+  }
+
+  bool At(std::uint64_t /*tick*/, SessionInput& input, std::vector<RecordedEvent>& events) override
+  {
+    this->Read(&events);
+    input = this->Raw;
+    AxisPlaces places = PlacesOf(this->Raw);
+    for (std::size_t axis = 0; axis < HandAxes; ++axis)
+    {
+      places[axis] -= this->Ignored[axis];
+    }
+    SetPlaces(input, places);
+    return true;
+  }
+
+  /// What hands do now is not made up for afterwards; but C-arm and table are where they are.
+  void Ignore()
+  {
+    const AxisPlaces before = PlacesOf(this->Raw);
+    this->Read(nullptr);
+    const AxisPlaces now = PlacesOf(this->Raw);
+    for (std::size_t axis = 0; axis < HandAxes; ++axis)
+    {
+      this->Ignored[axis] += HandAxisTable[axis].group == ViewAxes ? 0.0 : now[axis] - before[axis];
+    }
+  }
+
+private:
+  void Read(std::vector<RecordedEvent>* events)
+  {
+    const double begin = static_cast<double>(this->Tick) / this->Rate;
+    this->Raw = this->Mux->Next(this->Tick, 1.0 / this->Rate);
+    ++this->Tick;
+    const double end = static_cast<double>(this->Tick) / this->Rate;
+    for (const double heartRate : this->Script.HeartRates(begin, end))
+    {
+      this->Waiting.push_back({ RecordedEvent::HeartRate, heartRate });
+    }
+    if (events)
+    {
+      events->insert(events->end(), this->Waiting.begin(), this->Waiting.end());
+      this->Waiting.clear();
+    }
+  }
+
+  std::shared_ptr<DeviceMux> Mux;
+  DriveScript Script;
+  double Rate;
+  SessionInput Raw;
+  AxisPlaces Ignored{};               ///< what hands moved while time stood still
+  std::vector<RecordedEvent> Waiting; ///< set while time stood still
+  std::uint64_t Tick = 0;             ///< of the mux, which goes on
+};
+
+std::unique_ptr<TickSource> SessionEngine::MakeSource()
+{
+  if (!this->Options.replay.empty())
+  {
+    auto replay = std::make_unique<ReplaySource>(this->Options.replay);
+    this->Recorded = &replay->Reader();
+    return replay;
+  }
+  if (!this->Mux)
+  {
+    throw std::invalid_argument("A session needs devices, or a recording to replay.");
+  }
+  auto hands = std::make_unique<HandsSource>(this->Mux, this->Options.script, this->TickRate);
+  this->Hands = hands.get();
+  return hands;
+}
+
 SessionEngine::SessionEngine(
   const SessionWorld& world, std::shared_ptr<DeviceMux> mux, EngineOptions options)
   : Options(std::move(options))
   , TickRate(world.scenario.settings.tickRate)
   , Mux(std::move(mux))
-  , Session(world.wall, world.scenario)
+  , Runner(world.wall, world.scenario, world.wallHash, this->MakeSource())
   , Imager(world.wall->Topology(), world.scenario, world.background, true)
   , TicksPerScene(std::max<std::uint64_t>(
       1, static_cast<std::uint64_t>(std::lround(this->TickRate / this->Options.sceneRate))))
@@ -41,22 +119,14 @@ SessionEngine::SessionEngine(
   {
     this->Options.clock = [start = Clock::now()] { return SecondsSince(start); };
   }
-  this->Input = this->Session.StartInput();
-  if (!this->Options.replay.empty())
-  {
-    this->Replay = std::make_unique<RecordingReplay>(RecordingReader(this->Options.replay));
-  }
-  else if (!this->Mux)
-  {
-    throw std::invalid_argument("A session needs devices, or a recording to replay.");
-  }
+  this->Runner.say = [this](std::uint64_t tick, const std::string& text) { this->Say(tick, text); };
+  this->Runner.afterTick = [this](const SessionReport& report) { this->AfterTick(report); };
   if (!this->Options.record.empty())
   {
-    this->Recorder = std::make_unique<RecordingWriter>(this->Options.record,
-      HeaderOf(
-        world.scenario, world.wallHash, "coronary-simulator " DYNAMICCORONARY_VERSION, UtcTime()));
+    this->Runner.Record(
+      this->Options.record, "coronary-simulator " DYNAMICCORONARY_VERSION, UtcTime());
   }
-  this->Imager.Aim(this->Session.Pose(), this->Session.FieldOfView());
+  this->Imager.Aim(this->Runner.Session().Pose(), this->Runner.Session().FieldOfView());
 }
 
 SessionEngine::~SessionEngine()
@@ -86,26 +156,12 @@ void SessionEngine::Join()
 void SessionEngine::Stop()
 {
   this->Join();
-  // Whatever happens now, it is over with the recording: without Finish() it leaves no file.
-  const std::unique_ptr<RecordingWriter> recorder = std::move(this->Recorder);
   if (!this->Failure.empty())
   {
+    this->Runner.DropRecording();
     throw std::runtime_error(this->Failure);
   }
-  if (recorder)
-  {
-    if (this->TickNumber % RecordedHashInterval != 0)
-    {
-      recorder->StateHash(this->TickNumber, this->Session.StateHash());
-    }
-    recorder->Finish(this->TickNumber);
-  }
-}
-
-void SessionEngine::Post(const RecordedEvent& event)
-{
-  const std::lock_guard<std::mutex> lock(this->EventMutex);
-  this->Posted.push_back(event);
+  this->Runner.FinishRecording();
 }
 
 bool SessionEngine::LatestScene(SessionSnapshot& snapshot)
@@ -132,8 +188,12 @@ bool SessionEngine::LatestImage(ShownImage& image)
 
 std::vector<std::string> SessionEngine::TakeMessages()
 {
-  const std::lock_guard<std::mutex> lock(this->MessageMutex);
-  return std::exchange(this->Messages, {});
+  std::vector<std::string> taken;
+  for (std::string message; this->Messages.Pop(message);)
+  {
+    taken.push_back(std::move(message));
+  }
+  return taken;
 }
 
 EngineRates SessionEngine::Rates() const
@@ -161,149 +221,51 @@ void SessionEngine::Say(std::uint64_t tick, const std::string& text)
 {
   char time[32];
   std::snprintf(time, sizeof(time), "%.1f s: ", static_cast<double>(tick) / this->TickRate);
-  const std::lock_guard<std::mutex> lock(this->MessageMutex);
-  if (this->Messages.size() < MostMessages)
-  {
-    this->Messages.push_back(time + text);
-  }
+  this->Messages.Push(time + text);
 }
 
 void SessionEngine::Fail(const std::string& why)
 {
   {
-    const std::lock_guard<std::mutex> lock(this->MessageMutex);
+    const std::lock_guard<std::mutex> lock(this->FailureMutex);
     this->Failure = this->Failure.empty() ? why : this->Failure; // the first is the cause
   }
   this->Over = true;
 }
 
-void SessionEngine::ApplyEvents()
+void SessionEngine::AfterTick(const SessionReport& report)
 {
-  // Whoever posts holds the lock for a moment only; if it is now, the events come a tick later.
-  const std::unique_lock<std::mutex> lock(this->EventMutex, std::try_to_lock);
-  if (lock && !this->Posted.empty())
-  {
-    this->Events.insert(this->Events.end(), this->Posted.begin(), this->Posted.end());
-    this->Posted.clear();
-  }
-}
-
-/// Whether the hands may feel what was computed.
-bool SessionEngine::Sound() const
-{
-  const TickReport& report = this->Session.Report().tick;
-  return std::isfinite(report.proximalForce) && std::isfinite(report.proximalTorque);
-}
-
-void SessionEngine::ReadHands(bool ignored)
-{
-  const SessionInput before = this->Raw;
-  const double begin = static_cast<double>(this->MuxTick) / this->TickRate;
-  this->Raw = this->Mux->Next(this->MuxTick, 1.0 / this->TickRate);
-  ++this->MuxTick;
-  const double end = static_cast<double>(this->MuxTick) / this->TickRate;
-  for (const double heartRate : this->Options.script.HeartRates(begin, end))
-  {
-    this->Events.push_back({ RecordedEvent::HeartRate, heartRate });
-  }
-  const auto each = [](auto change, SessionInput& to, const SessionInput& a, const SessionInput& b)
-  {
-    change(to.drive.wirePosition, a.drive.wirePosition, b.drive.wirePosition);
-    change(to.drive.wireAngle, a.drive.wireAngle, b.drive.wireAngle);
-    change(to.drive.catheterPosition, a.drive.catheterPosition, b.drive.catheterPosition);
-    change(to.drive.catheterAngle, a.drive.catheterAngle, b.drive.catheterAngle);
-    change(to.syringe, a.syringe, b.syringe);
-  };
-  if (ignored)
-  {
-    each([](double& sum, double now, double then) { sum += now - then; }, this->Ignored, this->Raw,
-      before);
-    return;
-  }
-  this->Input = this->Raw;
-  each([](double& place, double now, double shift) { place = now - shift; }, this->Input, this->Raw,
-    this->Ignored);
-}
-
-bool SessionEngine::Tick()
-{
-  if (this->Replay)
-  {
-    if (!this->Replay->At(this->TickNumber, this->Input, this->Events))
-    {
-      return false;
-    }
-  }
-  else
-  {
-    this->ReadHands(false);
-    this->ApplyEvents();
-  }
-  for (const RecordedEvent& event : this->Events)
-  {
-    this->Session.Apply(event);
-    if (this->Recorder)
-    {
-      this->Recorder->Event(this->TickNumber, event);
-    }
-  }
-  this->Events.clear();
-  if (this->Recorder)
-  {
-    this->Recorder->Input(this->TickNumber, this->Input);
-  }
-  const SessionReport& report = this->Session.Step(this->Input);
-  ++this->TickNumber;
-  for (const std::string& text : this->Session.TakeMessages())
-  {
-    this->Say(this->TickNumber, text);
-    if (this->Recorder)
-    {
-      this->Recorder->Annotation(this->TickNumber, text);
-    }
-  }
-  if (this->Recorder && this->TickNumber % RecordedHashInterval == 0)
-  {
-    this->Recorder->StateHash(this->TickNumber, this->Session.StateHash());
-  }
-  std::uint64_t expected = 0;
-  if (this->Replay && this->Replay->ExpectedHash(this->TickNumber, expected))
-  {
-    ++this->HashesCompared;
-    this->HashesEqual += expected == this->Session.StateHash() ? 1 : 0;
-  }
+  const std::uint64_t tick = this->Runner.Tick();
+  this->HashesCompared = this->Runner.Compared().compared;
+  this->HashesEqual = this->Runner.Compared().equal;
   const TickReport& forces = report.tick;
-  if (this->Recorder && this->TickNumber % ForceInterval == 0)
-  {
-    this->Recorder->Force(this->TickNumber, ForcesOf(report.tick));
-  }
-  if (this->Mux && this->TickNumber % CommandInterval == 0 && this->Sound())
+  // Hands feel only what is sound.
+  if (this->Mux && tick % CommandInterval == 0 && std::isfinite(forces.proximalForce) &&
+    std::isfinite(forces.proximalTorque))
   {
     ForceFrame felt;
-    felt.tick = this->TickNumber;
+    felt.tick = tick;
     felt.wireForce = -forces.proximalForce;
     felt.wireTorque = -forces.proximalTorque;
     this->Mux->Command(felt);
-    this->Mux->Heartbeat(this->TickNumber);
+    this->Mux->Heartbeat(tick);
   }
   if (report.exposed)
   {
     this->PublishExposure();
   }
-  if (this->TickNumber % this->TicksPerScene == 0)
+  if (tick % this->TicksPerScene == 0)
   {
     this->PublishScene();
   }
-  return true;
 }
 
 /// The recording has nothing more to say.
 void SessionEngine::EndReplay()
 {
-  const RecordingReader& reader = this->Replay->Reader();
-  if (reader.HowEnded() != RecordingReader::Ending::Complete)
+  if (this->Recorded && this->Recorded->HowEnded() != RecordingReader::Ending::Complete)
   {
-    this->Say(this->TickNumber, reader.EndingText() + ".");
+    this->Say(this->Runner.Tick(), this->Recorded->EndingText() + ".");
   }
   this->PublishScene();
   this->Over = true;
@@ -311,8 +273,8 @@ void SessionEngine::EndReplay()
 
 void SessionEngine::PublishScene()
 {
-  this->Aim.Write({ this->Session.Pose(), this->Session.FieldOfView() });
-  this->Session.SnapshotOfScene(this->Options.wallPoints, this->SceneBuffer);
+  this->Aim.Write({ this->Runner.Session().Pose(), this->Runner.Session().FieldOfView() });
+  this->Runner.Session().SnapshotOfScene(this->Options.wallPoints, this->SceneBuffer);
   const std::unique_lock<std::mutex> lock(this->Scene.mutex, std::try_to_lock);
   if (lock)
   {
@@ -323,7 +285,7 @@ void SessionEngine::PublishScene()
 
 void SessionEngine::PublishExposure()
 {
-  this->Session.SnapshotOfImage(this->ExposureBuffer);
+  this->Runner.Session().SnapshotOfImage(this->ExposureBuffer);
   {
     const std::unique_lock<std::mutex> lock(this->Exposed.mutex, std::try_to_lock);
     if (!lock || this->Exposed.fresh)
@@ -347,10 +309,10 @@ void SessionEngine::Rest()
   this->Load = 0.0;
   const double start = this->Options.clock();
   std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  for (auto n = std::lround((this->Options.clock() - start) * this->TickRate); n > 0 && this->Mux;
+  for (auto n = std::lround((this->Options.clock() - start) * this->TickRate); n > 0 && this->Hands;
        --n)
   {
-    this->ReadHands(true);
+    this->Hands->Ignore();
   }
 }
 
@@ -371,29 +333,26 @@ void SessionEngine::RunPhysics()
       {
         this->Rest();
         pausedFor += time() - now;
-        ticksBefore = this->TickNumber;
+        ticksBefore = this->Runner.Tick();
         worked = 0.0;
         second = time();
         continue;
       }
       const std::int64_t due = clock.Due(now - pausedFor);
       const double before = time();
-      for (std::int64_t n = 0; n < due && !this->Quit; ++n)
+      if (!this->Runner.Run(due))
       {
-        if (!this->Tick())
-        {
-          this->EndReplay();
-          return;
-        }
+        this->EndReplay();
+        return;
       }
       worked += time() - before;
       const double interval = time() - second;
       if (interval >= 1.0)
       {
-        this->RateOfTicks = static_cast<double>(this->TickNumber - ticksBefore) / interval;
+        this->RateOfTicks = static_cast<double>(this->Runner.Tick() - ticksBefore) / interval;
         this->Load = worked / interval;
         this->Lost = clock.LostSeconds();
-        ticksBefore = this->TickNumber;
+        ticksBefore = this->Runner.Tick();
         worked = 0.0;
         second = time();
       }

@@ -8,10 +8,10 @@
 #include "DeviceMux.h"
 #include "DriveScript.h"
 #include "FixedStepClock.h"
-#include "Recording.h"
+#include "RingQueue.h"
 #include "SessionImager.h"
+#include "SessionRunner.h"
 #include "SessionWorld.h"
-#include "TrainingSession.h"
 
 #include <atomic>
 #include <condition_variable>
@@ -83,8 +83,8 @@ public:
   bool IsPaused() const { return this->Paused; }
   bool IsOver() const { return this->Over; } ///< the replay has ended, or the session failed
 
-  /// Comes before the next tick.
-  void Post(const RecordedEvent& event);
+  /// As SessionRunner::Post.
+  void Post(const RecordedEvent& event) { this->Runner.Post(event); }
 
   ///@{
   /// Of the images; from the next one on.
@@ -132,29 +132,23 @@ private:
   void RunPhysics();
   void RunImages();
   void Rest();
-  bool Tick();
+  void AfterTick(const SessionReport& report);
   void EndReplay();
-  void ReadHands(bool ignored);
-  void ApplyEvents();
   void Say(std::uint64_t tick, const std::string& text);
   void PublishScene();
   void PublishExposure();
   void Fail(const std::string& why);
-  bool Sound() const;
+
+  class HandsSource;
+  std::unique_ptr<TickSource> MakeSource();
 
   EngineOptions Options;
   double TickRate;
   std::shared_ptr<DeviceMux> Mux;
-  TrainingSession Session;
+  HandsSource* Hands = nullptr;              ///< of the runner; null with replay
+  const RecordingReader* Recorded = nullptr; ///< likewise, with replay
+  SessionRunner Runner;
   SessionImager Imager;
-  std::unique_ptr<RecordingWriter> Recorder;
-  std::unique_ptr<RecordingReplay> Replay;
-  SessionInput Input;
-  SessionInput Raw;     ///< of the mux
-  SessionInput Ignored; ///< what hands moved while time stood still
-  std::uint64_t MuxTick = 0;
-  std::vector<RecordedEvent> Events; ///< of the next tick
-  std::uint64_t TickNumber = 0;
   std::uint64_t TicksPerScene;
 
   std::thread Physics;
@@ -165,10 +159,8 @@ private:
   std::atomic<int> WantedMode{ 0 };
   std::atomic<bool> MaskWanted{ false };
 
-  std::mutex EventMutex;
-  std::vector<RecordedEvent> Posted;
-  std::mutex MessageMutex;
-  std::vector<std::string> Messages;
+  RingQueue<std::string, 1000> Messages; ///< of the physics, that nobody has taken
+  std::mutex FailureMutex;
   std::string Failure;
 
   SessionSnapshot SceneBuffer;

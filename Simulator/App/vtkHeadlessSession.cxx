@@ -1,18 +1,16 @@
 #include "HeadlessSession.h"
 
 #include "AtomicFile.h"
-#include "DriveScript.h"
 #include "FileSeries.h"
 #include "InstrumentCatalogue.h"
 #include "Interruption.h"
 #include "Program.h"
 #include "ProgressDisplay.h"
-#include "Recording.h"
 #include "SessionImager.h"
 #include "SessionPictures.h"
+#include "SessionRunner.h"
 #include "SessionStatistics.h"
 #include "StagedFolder.h"
-#include "TrainingSession.h"
 #include "UtcTime.h"
 #include "vtkMessageTrap.h"
 #include "vtkSessionFiles.h"
@@ -35,97 +33,8 @@ namespace
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-constexpr std::uint64_t ForceInterval = 40;        // ticks between recorded forces: 50 Hz at 2 kHz
-constexpr std::uint64_t InterruptionInterval = 64; // ticks between looks at signals
+constexpr std::int64_t InterruptionInterval = 64; // ticks between looks at signals
 constexpr std::uint64_t MostPrinted = 50; // messages on the console; statistics.json has more
-
-/// Where the hands' movements come from.
-class Hands
-{
-public:
-  explicit Hands(const HeadlessOptions& options)
-    : HasScript(!options.script.empty())
-    , Most(options.ticks)
-  {
-    if (this->HasScript)
-    {
-      this->Script = ReadDriveScript(options.script);
-    }
-    if (!options.replay.empty())
-    {
-      this->Replay = std::make_unique<RecordingReplay>(RecordingReader(options.replay));
-    }
-  }
-
-  const RecordingReplay* Recording() const { return this->Replay.get(); }
-
-  /// Where they are before the first tick.
-  void SetStart(const SessionInput& start) { this->Start = start; }
-
-  /// Known before the start; 0: not known.
-  std::uint64_t Expected(double rate) const
-  {
-    const auto scripted = static_cast<std::uint64_t>(std::ceil(this->Script.Duration() * rate));
-    return this->Most > 0 ? this->Most : this->Replay ? 0 : scripted;
-  }
-
-  /// @return false when it is over
-  bool At(std::uint64_t tick, double rate, SessionInput& input, std::vector<RecordedEvent>& events)
-  {
-    if (this->Most > 0 && tick >= this->Most)
-    {
-      return false;
-    }
-    if (this->Replay)
-    {
-      return this->Replay->At(tick, input, events);
-    }
-    events.clear();
-    if (this->HasScript)
-    {
-      // The place at the end of the step, so that a piece is over when its ticks are.
-      const double begin = static_cast<double>(tick) / rate;
-      const double end = static_cast<double>(tick + 1) / rate;
-      input = this->Script.At(end, this->Start);
-      for (const double heartRate : this->Script.HeartRates(begin, end))
-      {
-        events.push_back({ RecordedEvent::HeartRate, heartRate });
-      }
-      return this->Most > 0 || tick < this->Expected(rate);
-    }
-    return true;
-  }
-
-  bool ExpectedHash(std::uint64_t tick, std::uint64_t& hash)
-  {
-    return this->Replay && this->Replay->ExpectedHash(tick, hash);
-  }
-
-private:
-  bool HasScript;
-  std::uint64_t Most;
-  DriveScript Script;
-  SessionInput Start;
-  std::unique_ptr<RecordingReplay> Replay;
-};
-
-/// The state held against a recording.
-struct Comparison
-{
-  std::uint64_t compared = 0;
-  std::uint64_t equal = 0;
-  std::uint64_t firstDifference = 0; ///< tick; 0: none
-
-  void Add(std::uint64_t tick, bool same)
-  {
-    ++this->compared;
-    this->equal += same ? 1 : 0;
-    if (!same && this->firstDifference == 0)
-    {
-      this->firstDifference = tick;
-    }
-  }
-};
 
 /// Whether it is a name as wire_00012.vtp.
 bool IsNumbered(const std::string& name, const std::string& start, const std::string& end)
@@ -291,9 +200,8 @@ void Warn(const std::string& text)
 
 /// Before anything is put in its place: what is not verified leaves nothing.
 void FinishComparison(
-  const HeadlessOptions& options, const Hands& hands, const Comparison& comparison)
+  const HeadlessOptions& options, const RecordingReader& reader, const HashComparison& comparison)
 {
-  const RecordingReader& reader = hands.Recording()->Reader();
   const RecordingReader::Ending ending = reader.HowEnded();
   const bool broken =
     ending == RecordingReader::Ending::Torn || ending == RecordingReader::Ending::Damaged;
@@ -398,59 +306,56 @@ namespace
 class HeadlessRun
 {
 public:
-  HeadlessRun(const HeadlessOptions& options, const SessionWorld& world, Hands& hands)
+  /// @param replay  that the source goes through; null: none  @param expected  ticks; 0: not known before the end
+  HeadlessRun(const HeadlessOptions& options, const SessionWorld& world,
+    std::unique_ptr<TickSource> source, const RecordingReader* replay, std::uint64_t expected)
     : Options(options)
     , World(world)
-    , Hands_(hands)
+    , Replay(replay)
+    , Expected(expected)
     , Rate(world.scenario.settings.tickRate)
-    , Session(world.wall, world.scenario)
+    , Runner(world.wall, world.scenario, world.wallHash, std::move(source))
     , Pictures({ options.xray, options.scene }, world)
     , Files(options, world.wall->Topology())
     , Statistics(world.wall->Topology())
     , Interval(
         static_cast<std::uint64_t>(std::max(1.0, std::round(this->Rate / options.outputRate))))
   {
-    hands.SetStart(this->Session.StartInput());
+    this->Runner.maximumTicks = options.ticks;
+    this->Runner.say = [this](std::uint64_t tick, const std::string& text)
+    { this->Tell(tick, text); };
+    this->Runner.afterTick = [this](const SessionReport& report) { this->Keep(report); };
     if (!options.record.empty())
     {
-      this->Recording = std::make_unique<RecordingWriter>(options.record,
-        HeaderOf(world.scenario, world.wallHash, "coronary-simulator " DYNAMICCORONARY_VERSION,
-          UtcTime()));
+      this->Runner.Record(options.record, "coronary-simulator " DYNAMICCORONARY_VERSION, UtcTime());
     }
   }
 
   void Run(ProgressDisplay& progress)
   {
-    const std::uint64_t expected = this->Hands_.Expected(this->Rate);
-    while (this->Hands_.At(this->Tick, this->Rate, this->Input, this->Events))
+    bool goesOn = true;
+    while (goesOn)
     {
-      if (this->Tick % InterruptionInterval == 0)
+      ThrowIfInterrupted();
+      if (this->Expected > 0)
       {
-        ThrowIfInterrupted();
-        if (expected > 0)
-        {
-          progress.Update(static_cast<double>(this->Tick) / static_cast<double>(expected));
-        }
+        progress.Update(
+          static_cast<double>(this->Runner.Tick()) / static_cast<double>(this->Expected));
       }
-      this->Step();
+      const auto before = std::chrono::steady_clock::now();
+      goesOn = this->Runner.Run(InterruptionInterval);
+      this->Running += std::chrono::steady_clock::now() - before;
     }
     ThrowIfInterrupted();
   }
 
   void Finish()
   {
-    if (this->Hands_.Recording())
+    if (this->Replay)
     {
-      FinishComparison(this->Options, this->Hands_, this->Compared);
+      FinishComparison(this->Options, *this->Replay, this->Runner.Compared());
     }
-    if (this->Recording)
-    {
-      if (this->Tick % RecordedHashInterval != 0)
-      {
-        this->Recording->StateHash(this->Tick, this->Session.StateHash());
-      }
-      this->Recording->Finish(this->Tick);
-    }
+    this->Runner.FinishRecording();
     if (this->Files)
     {
       this->Files.Finish(this->Result(), this->Pictures);
@@ -470,57 +375,41 @@ public:
     }
     std::printf(
       "%s: %llu ticks, %.3g s; greatest penetration %.3g mm; %llu messages; branches: %s\n",
-      this->World.scenario.name.c_str(), static_cast<unsigned long long>(this->Tick),
-      static_cast<double>(this->Tick) / this->Rate, this->Statistics.MaximumPenetration(),
+      this->World.scenario.name.c_str(), static_cast<unsigned long long>(this->Runner.Tick()),
+      static_cast<double>(this->Runner.Tick()) / this->Rate, this->Statistics.MaximumPenetration(),
       static_cast<unsigned long long>(this->Statistics.Messages()),
       branches.empty() ? "none" : branches.c_str());
-    const SessionMetrics& metrics = this->Session.Metrics();
+    const SessionMetrics& metrics = this->Runner.Session().Metrics();
     if (metrics.frames > 0 || metrics.contrast > 0.0)
     {
       std::printf("%lld X-ray frames, %.3g mGy, %.3g Gy cm2; %.3g mL of contrast medium\n",
         static_cast<long long>(metrics.frames), metrics.airKerma, metrics.doseAreaProduct,
         metrics.contrast);
     }
-    const double seconds = std::chrono::duration<double>(this->Simulating).count();
-    if (this->Tick > 0 && seconds > 0.0)
+    const double seconds = std::chrono::duration<double>(this->Running - this->Keeping).count();
+    if (this->Runner.Tick() > 0 && seconds > 0.0)
     {
       std::printf("%.3g us a tick, %.3g times real time\n",
-        1e6 * seconds / static_cast<double>(this->Tick),
-        static_cast<double>(this->Tick) / this->Rate / seconds);
+        1e6 * seconds / static_cast<double>(this->Runner.Tick()),
+        static_cast<double>(this->Runner.Tick()) / this->Rate / seconds);
     }
-    if (this->Hands_.Recording())
+    if (this->Replay)
     {
       std::printf("%llu of %llu hashes are equal\n",
-        static_cast<unsigned long long>(this->Compared.equal),
-        static_cast<unsigned long long>(this->Compared.compared));
+        static_cast<unsigned long long>(this->Runner.Compared().equal),
+        static_cast<unsigned long long>(this->Runner.Compared().compared));
     }
   }
 
 private:
-  void Step()
+  void Keep(const SessionReport& report)
   {
-    for (const RecordedEvent& event : this->Events)
-    {
-      this->UnknownEvents += this->Session.Apply(event) ? 0 : 1;
-      if (this->Recording)
-      {
-        this->Recording->Event(this->Tick, event);
-      }
-    }
-    if (this->Recording)
-    {
-      this->Recording->Input(this->Tick, this->Input);
-    }
     const auto before = std::chrono::steady_clock::now();
-    const SessionReport& report = this->Session.Step(this->Input);
-    this->Simulating += std::chrono::steady_clock::now() - before;
-    ++this->Tick; // what follows is of the state after this many steps
+    const std::uint64_t tick = this->Runner.Tick();
     this->Statistics.Add(report.tick);
-    this->TellMessages();
-    this->KeepHash();
-    if (this->Recording && this->Tick % ForceInterval == 0)
+    if (tick % RecordedHashInterval == 0)
     {
-      this->Recording->Force(this->Tick, ForcesOf(report.tick));
+      this->Hashes.push_back(Hexadecimal(this->Runner.Session().StateHash()));
     }
     SessionPictures::FolderCallback folder;
     if (this->Files)
@@ -529,54 +418,29 @@ private:
     }
     if (report.exposed)
     {
-      this->Pictures.AddFrame(this->Session, folder, this->Recording.get());
+      this->Pictures.AddFrame(this->Runner.Session(), folder, this->Runner.Recording());
     }
-    if (this->Files && (this->Tick - 1) % this->Interval == 0)
+    if (this->Files && (tick - 1) % this->Interval == 0)
     {
-      this->Files.SetTick(this->Tick);
-      this->Files.Add(this->Session, this->World.scenario, this->Trap);
-      this->Pictures.AddScene(this->Session, folder);
+      this->Files.SetTick(tick);
+      this->Files.Add(this->Runner.Session(), this->World.scenario, this->Trap);
+      this->Pictures.AddScene(this->Runner.Session(), folder);
     }
+    this->Keeping += std::chrono::steady_clock::now() - before;
   }
 
-  void TellMessages()
+  void Tell(std::uint64_t tick, const std::string& text)
   {
-    for (const std::string& text : this->Session.TakeMessages())
+    this->Statistics.AddMessage(tick, text);
+    if (!this->Options.quiet && this->Statistics.Messages() <= MostPrinted)
     {
-      this->Statistics.AddMessage(this->Tick, text);
-      if (!this->Options.quiet)
-      {
-        std::fprintf(
-          stderr, "tick %llu: %s\n", static_cast<unsigned long long>(this->Tick), text.c_str());
-      }
-      if (this->Recording)
-      {
-        this->Recording->Annotation(this->Tick, text);
-      }
-    }
-  }
-
-  void KeepHash()
-  {
-    if (this->Tick % RecordedHashInterval == 0)
-    {
-      const std::uint64_t hash = this->Session.StateHash();
-      this->Hashes.push_back(Hexadecimal(hash));
-      if (this->Recording)
-      {
-        this->Recording->StateHash(this->Tick, hash);
-      }
-    }
-    std::uint64_t wanted = 0;
-    if (this->Hands_.ExpectedHash(this->Tick, wanted))
-    {
-      this->Compared.Add(this->Tick, wanted == this->Session.StateHash());
+      std::fprintf(stderr, "tick %llu: %s\n", static_cast<unsigned long long>(tick), text.c_str());
     }
   }
 
   Json Result() const
   {
-    const WallTopology& topology = this->Session.Topology();
+    const WallTopology& topology = this->Runner.Session().Topology();
     const Scenario& scenario = this->World.scenario;
     Json result = this->Statistics.ToJson();
     result["program"] = "coronary-simulator " DYNAMICCORONARY_VERSION;
@@ -586,44 +450,41 @@ private:
     result["wire"] = scenario.wire.name;
     result["catheter"] = scenario.catheter.name;
     result["tick_hz"] = this->Rate;
-    result["seconds"] = static_cast<double>(this->Tick) / this->Rate;
+    result["seconds"] = static_cast<double>(this->Runner.Tick()) / this->Rate;
     result["wall"] = { { "points", topology.points }, { "triangles", topology.triangles.size() },
       { "hash", Hexadecimal(this->World.wallHash) } };
-    result["metrics"] = MetricsToJson(this->Session.Metrics(), topology);
+    result["metrics"] = MetricsToJson(this->Runner.Session().Metrics(), topology);
     result["state_hash_interval"] = RecordedHashInterval;
     result["state_hashes"] = this->Hashes;
-    result["last_state_hash"] = Hexadecimal(this->Session.StateHash());
-    if (this->Hands_.Recording())
+    result["last_state_hash"] = Hexadecimal(this->Runner.Session().StateHash());
+    if (this->Replay)
     {
-      result["replay"] = { { "compared", this->Compared.compared },
-        { "equal", this->Compared.equal },
+      result["replay"] = { { "compared", this->Runner.Compared().compared },
+        { "equal", this->Runner.Compared().equal },
         { "first_different_tick",
-          this->Compared.firstDifference > 0 ? Json(this->Compared.firstDifference)
-                                             : Json(nullptr) },
-        { "unknown_chunks", this->Hands_.Recording()->Reader().Unknown() },
-        { "unknown_events", this->UnknownEvents } };
+          this->Runner.Compared().firstDifference > 0
+            ? Json(this->Runner.Compared().firstDifference)
+            : Json(nullptr) },
+        { "unknown_chunks", this->Replay->Unknown() },
+        { "unknown_events", this->Runner.UnknownEvents() } };
     }
     return result;
   }
 
   const HeadlessOptions& Options;
   const SessionWorld& World;
-  Hands& Hands_;
+  const RecordingReader* Replay;
+  std::uint64_t Expected;
   double Rate;
-  TrainingSession Session;
+  SessionRunner Runner;
   SessionPictures Pictures;
   OutputFiles Files;
   SessionStatistics Statistics;
   std::uint64_t Interval;
   vtkMessageTrap Trap;
-  std::unique_ptr<RecordingWriter> Recording;
-  Comparison Compared;
   Json Hashes = Json::array();
-  SessionInput Input;
-  std::vector<RecordedEvent> Events;
-  std::uint64_t UnknownEvents = 0;
-  std::uint64_t Tick = 0;
-  std::chrono::steady_clock::duration Simulating{};
+  std::chrono::steady_clock::duration Running{};
+  std::chrono::steady_clock::duration Keeping{}; // of files and pictures
 };
 }
 
@@ -648,8 +509,15 @@ WorldProgress ShownBy(ProgressDisplay& progress)
 void RunHeadless(const HeadlessOptions& options)
 {
   const Scenario scenario = ScenarioOf(options);
-  Hands hands(options);
-  if (hands.Expected(scenario.settings.tickRate) == 0 && !hands.Recording())
+  const double rate = scenario.settings.tickRate;
+  const DriveScript script =
+    options.script.empty() ? DriveScript() : ReadDriveScript(options.script);
+  auto recorded = options.replay.empty() ? nullptr : std::make_unique<ReplaySource>(options.replay);
+  const RecordingReader* replay = recorded ? &recorded->Reader() : nullptr;
+  const auto expected = options.ticks > 0 || recorded
+    ? options.ticks
+    : static_cast<std::uint64_t>(std::ceil(script.Duration() * rate));
+  if (expected == 0 && !recorded)
   {
     throw UsageError(
       "--ticks is required where neither --script nor --replay says how long it takes");
@@ -657,11 +525,17 @@ void RunHeadless(const HeadlessOptions& options)
   const int preparations = options.xray ? 2 : 1;
   auto progress = std::make_unique<ProgressDisplay>("step", preparations + 1, options.quiet);
   const SessionWorld world = LoadWorld(scenario, options.xray, ShownBy(*progress));
-  if (hands.Recording())
+  if (replay)
   {
     CheckRecording(options.replay, scenario, world.wallHash, !options.verify);
   }
-  HeadlessRun run(options, world, hands);
+  std::unique_ptr<TickSource> source = std::move(recorded);
+  if (!source)
+  {
+    source =
+      std::make_unique<ScriptSource>(script, StartInputOf(world.scenario), rate, options.ticks > 0);
+  }
+  HeadlessRun run(options, world, std::move(source), replay, expected);
   progress->BeginStep(preparations, "simulation");
   run.Run(*progress);
   run.Finish();

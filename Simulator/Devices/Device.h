@@ -5,7 +5,7 @@
 #ifndef DynamicCoronary_Device_h
 #define DynamicCoronary_Device_h
 
-#include "SessionInput.h"
+#include "HandAxes.h"
 
 #include <cstdint>
 #include <memory>
@@ -21,16 +21,6 @@ enum class DeviceState : std::uint8_t
   Disconnected, ///< not there, and waited for: pose held, pedals released, no injection
   Refused,      ///< not ours, of another version, or not allowed; tried again now and then
   Ended         ///< a recording or a script that is over: its pose is held
-};
-
-/// Bits of InputFrame::axes: what one source moves at a time.
-enum DeviceAxes : std::uint32_t
-{
-  WireAxes = 1U,
-  CatheterAxes = 2U,
-  SyringeAxis = 4U,
-  ViewAxes = 8U, ///< C-arm and table
-  AllAxes = 15U
 };
 
 /// What a device says at one tick. Places are of its own: they start somewhere, and never jump.

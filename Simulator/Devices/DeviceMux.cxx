@@ -9,7 +9,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Degree = M_PI / 180.0;
 constexpr std::size_t ViewGroup = 3;
 
 struct GroupPlaces
@@ -21,29 +20,9 @@ struct GroupPlaces
 constexpr std::array<GroupPlaces, DeviceMux::Groups> GroupTable{ { { WireAxes, 0, 2 },
   { CatheterAxes, 2, 4 }, { SyringeAxis, 4, 5 }, { ViewAxes, 5, 11 } } };
 
-struct PlaceTraits
+double Limited(double value, const HandAxis& axis)
 {
-  double noise; ///< what hands at rest move on encoders
-  double low;
-  double high;
-};
-constexpr double Anywhere = 1e300;
-constexpr std::array<PlaceTraits, 11> Traits{ { { 0.2, -Anywhere, Anywhere },
-  { 0.02, -Anywhere, Anywhere }, { 0.2, -Anywhere, Anywhere }, { 0.02, -Anywhere, Anywhere },
-  { 0.05, -Anywhere, Anywhere }, { 0.005, -120.0 * Degree, 120.0 * Degree },
-  { 0.005, -55.0 * Degree, 55.0 * Degree }, { 1.0, 900.0, 1300.0 }, { 1.0, -200.0, 200.0 },
-  { 1.0, -200.0, 200.0 }, { 1.0, -200.0, 200.0 } } };
-
-std::array<double, 11> PlacesOf(const SessionInput& input)
-{
-  return { input.drive.wirePosition, input.drive.wireAngle, input.drive.catheterPosition,
-    input.drive.catheterAngle, input.syringe, input.primary, input.secondary,
-    input.sourceToDetector, input.table[0], input.table[1], input.table[2] };
-}
-
-double Limited(double value, const PlaceTraits& traits)
-{
-  return std::clamp(value, traits.low, traits.high);
+  return std::clamp(value, axis.low, axis.high);
 }
 }
 
@@ -72,7 +51,7 @@ void DeviceMux::Place(const ViewPlace& view)
   {
     if (std::isfinite(wanted[n]))
     {
-      const double place = Limited(wanted[n], Traits[n]);
+      const double place = Limited(wanted[n], HandAxisTable[n]);
       this->Offset[n] += place - this->Now[n];
       this->Now[n] = place;
     }
@@ -123,7 +102,7 @@ void DeviceMux::NoteMovement(Source& source, std::size_t group, std::uint64_t ti
   bool moved = false;
   for (std::size_t n = places.first; n < places.end; ++n)
   {
-    const double noise = source.noisy ? Traits[n].noise : 0.0;
+    const double noise = source.noisy ? HandAxisTable[n].tremble : 0.0;
     moved = moved || std::abs(source.places[n] - hand.reference[n]) > noise;
   }
   if (!hand.seen || moved)
@@ -203,7 +182,7 @@ void DeviceMux::Follow(std::size_t group)
   for (std::size_t n = places.first; n < places.end; ++n)
   {
     const double wanted = source.places[n] + this->Offset[n];
-    this->Now[n] = Limited(wanted, Traits[n]);
+    this->Now[n] = Limited(wanted, HandAxisTable[n]);
     if (this->Now[n] != wanted) // turning back at the end works at once
     {
       this->Offset[n] = this->Now[n] - source.places[n];
@@ -214,12 +193,7 @@ void DeviceMux::Follow(std::size_t group)
 void DeviceMux::Finish()
 {
   SessionInput& output = this->Output;
-  output.drive = { this->Now[0], this->Now[1], this->Now[2], this->Now[3] };
-  output.syringe = this->Now[4];
-  output.primary = this->Now[5];
-  output.secondary = this->Now[6];
-  output.sourceToDetector = this->Now[7];
-  output.table = { this->Now[8], this->Now[9], this->Now[10] };
+  SetPlaces(output, this->Now);
   output.pedals = 0;
   for (const Source& source : this->Sources)
   {

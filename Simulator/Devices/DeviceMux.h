@@ -36,8 +36,7 @@ struct ViewPlace
  * Changing from one device to another, losing one and finding it again do not move anything: what a device says counts
  * against the place where it took over. What moves the input is only ever that hands move.
  * Moving a device while another one is followed takes nothing over later on: it has to rest first here, too.
- * Pedals are those of all devices that are there. The view stays within what a C-arm can do: 120 degrees LAO and RAO,
- * 55 degrees cranial and caudal, 900 to 1300 mm to the detector, 200 mm of the table.
+ * Pedals are those of all devices that are there. The view stays within what a C-arm can do: HandAxisTable.
  */
 class DeviceMux
 {
@@ -67,8 +66,7 @@ public:
   int Follows(std::size_t group) const { return this->Owner.at(group).load(); }
 
 private:
-  static constexpr std::size_t Places = 11;
-  using PlaceArray = std::array<double, Places>;
+  using PlaceArray = AxisPlaces;
 
   /// One device's hold on one group.
   struct Hand
@@ -104,7 +102,7 @@ private:
   std::array<std::atomic<int>, Groups> Owner{ { { -1 }, { -1 }, { -1 }, { -1 } } };
   std::array<bool, Groups> Held{};  ///< its device is lost
   std::array<bool, Groups> Begun{}; ///< has followed a device
-  PlaceArray Now{ 0, 0, 0, 0, 0, 0, 0, 1100.0, 0, 0, 0 };
+  PlaceArray Now = PlacesOf(SessionInput());
   PlaceArray Offset{}; ///< of the device that each place follows
   std::uint64_t RestTicks = 0;
   SessionInput Output;

@@ -11,6 +11,7 @@
 #define DynamicCoronary_DeviceProtocol_h
 
 #include "Cobs.h"
+#include "HandAxes.h"
 
 #include <array>
 #include <cstddef>
@@ -105,32 +106,6 @@ private:
   std::uint16_t Expected = 0;
   Message Frame;
   DecoderCounts Counters;
-};
-
-enum class AxisKind : std::uint8_t
-{
-  None = 0,
-  WireAdvance = 1,
-  WireTurn = 2,
-  CatheterAdvance = 3,
-  CatheterTurn = 4,
-  Syringe = 5,
-  Primary = 6,
-  Secondary = 7,
-  SourceToDetector = 8,
-  TableLeft = 9,
-  TableBack = 10,
-  TableHead = 11,
-  Inflation = 12
-};
-
-enum class AxisUnit : std::uint8_t
-{
-  None = 0,
-  Millimetre = 1,
-  Radian = 2,
-  Millilitre = 3,
-  Atmosphere = 4
 };
 
 struct HelloMessage

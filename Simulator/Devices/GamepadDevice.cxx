@@ -66,11 +66,12 @@ double GamepadResponse(double deflection)
 HandWishes GamepadWishes(const GamepadState& state, const HandSpeeds& speeds)
 {
   HandWishes wishes;
-  wishes.wire = GamepadResponse(state.leftY);
-  wishes.wireTurning = GamepadResponse(state.leftX);
-  wishes.catheter = GamepadResponse(state.rightY);
-  wishes.catheterTurning = GamepadResponse(state.rightX);
-  wishes.syringe = GamepadResponse(state.rightTrigger) - (Holds(state, SelectButton) ? 1.0 : 0.0);
+  wishes[AxisKind::WireAdvance] = GamepadResponse(state.leftY);
+  wishes[AxisKind::WireTurn] = GamepadResponse(state.leftX);
+  wishes[AxisKind::CatheterAdvance] = GamepadResponse(state.rightY);
+  wishes[AxisKind::CatheterTurn] = GamepadResponse(state.rightX);
+  wishes[AxisKind::Syringe] =
+    GamepadResponse(state.rightTrigger) - (Holds(state, SelectButton) ? 1.0 : 0.0);
   if (Holds(state, LeftShoulder))
   {
     wishes.pace = speeds.fine;
@@ -81,16 +82,17 @@ HandWishes GamepadWishes(const GamepadState& state, const HandSpeeds& speeds)
   }
   if (Holds(state, NorthButton))
   {
-    wishes.table = { state.padX, 0.0, state.padY };
+    wishes[AxisKind::TableLeft] = state.padX;
+    wishes[AxisKind::TableHead] = state.padY;
   }
   else if (Holds(state, WestButton))
   {
-    wishes.detector = state.padY;
+    wishes[AxisKind::SourceToDetector] = state.padY;
   }
   else
   {
-    wishes.primary = state.padX;
-    wishes.secondary = state.padY;
+    wishes[AxisKind::Primary] = state.padX;
+    wishes[AxisKind::Secondary] = state.padY;
   }
   return wishes;
 }

@@ -5,41 +5,27 @@
 #ifndef DynamicCoronary_HandMotion_h
 #define DynamicCoronary_HandMotion_h
 
-#include "SessionInput.h"
-
-#include <array>
+#include "HandAxes.h"
 
 namespace coronary
 {
 /// At full deflection; fine and fast movement multiply them.
 struct HandSpeeds
 {
-  double wire = 10.0;           ///< mm/s
-  double wireTurning = 3.14;    ///< radians/s
-  double catheter = 5.0;        ///< mm/s
-  double catheterTurning = 1.0; ///< radians/s
-  double syringe = 3.0;         ///< mL/s
-  double view = 0.35;           ///< radians/s, of the C-arm
-  double detector = 50.0;       ///< mm/s
-  double table = 40.0;          ///< mm/s
+  AxisPlaces most = FullSpeeds(); ///< units of HandAxisTable a second
   double fine = 0.2;
   double fast = 4.0;
   double settling = 0.06; ///< s: time constant of starting and stopping
+
+  static AxisPlaces FullSpeeds();
 };
 
-/// Each -1 to 1.
 struct HandWishes
 {
-  double wire = 0.0;
-  double wireTurning = 0.0;
-  double catheter = 0.0;
-  double catheterTurning = 0.0;
-  double syringe = 0.0; ///< positive pushes
-  double primary = 0.0;
-  double secondary = 0.0;
-  double detector = 0.0;
-  std::array<double, 3> table{};
+  AxisPlaces axes{}; ///< each -1 to 1
   double pace = 1.0; ///< on the speed of wire and catheter: HandSpeeds::fine, 1 or HandSpeeds::fast
+
+  double& operator[](AxisKind kind) { return this->axes[IndexOf(kind)]; }
 };
 
 class HandMotion
@@ -59,10 +45,9 @@ public:
   const SessionInput& Place() const { return this->Place_; }
 
 private:
-  static constexpr std::size_t Axes = 11;
-
   HandSpeeds Settings;
-  std::array<double, Axes> Speed{};
+  AxisPlaces Speed{};
+  AxisPlaces Places{};
   SessionInput Place_;
 };
 }

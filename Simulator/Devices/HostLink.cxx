@@ -23,63 +23,27 @@ std::size_t KindOf(const CapsMessage& caps)
   return static_cast<std::size_t>(caps.kind);
 }
 
+constexpr double FastestInflation = 200.0; // atm/s
+
 /// Units a second that no hand reaches.
-double FastestOf(AxisUnit unit)
+double FastestOf(AxisKind kind)
 {
-  switch (unit)
-  {
-    case AxisUnit::Millimetre:
-      return 2000.0;
-    case AxisUnit::Radian:
-      return 60.0;
-    case AxisUnit::Millilitre:
-      return 100.0;
-    case AxisUnit::Atmosphere:
-      return 200.0;
-    case AxisUnit::None:
-      break;
-  }
-  return std::numeric_limits<double>::infinity();
+  const HandAxis* axis = HandAxisOf(kind);
+  return axis                     ? axis->fastest
+    : kind == AxisKind::Inflation ? FastestInflation
+                                  : std::numeric_limits<double>::infinity();
 }
 
 AxisUnit UnitOf(AxisKind kind)
 {
-  switch (kind)
-  {
-    case AxisKind::WireTurn:
-    case AxisKind::CatheterTurn:
-    case AxisKind::Primary:
-    case AxisKind::Secondary:
-      return AxisUnit::Radian;
-    case AxisKind::Syringe:
-      return AxisUnit::Millilitre;
-    case AxisKind::Inflation:
-      return AxisUnit::Atmosphere;
-    case AxisKind::None:
-      return AxisUnit::None;
-    default:
-      return AxisUnit::Millimetre;
-  }
+  const HandAxis* axis = HandAxisOf(kind);
+  return axis ? axis->unit : kind == AxisKind::Inflation ? AxisUnit::Atmosphere : AxisUnit::None;
 }
 
-std::uint32_t AxesOf(AxisKind kind)
+std::uint32_t GroupOf(AxisKind kind)
 {
-  switch (kind)
-  {
-    case AxisKind::WireAdvance:
-    case AxisKind::WireTurn:
-      return WireAxes;
-    case AxisKind::CatheterAdvance:
-    case AxisKind::CatheterTurn:
-      return CatheterAxes;
-    case AxisKind::Syringe:
-      return SyringeAxis;
-    case AxisKind::None:
-    case AxisKind::Inflation:
-      return 0;
-    default:
-      return ViewAxes;
-  }
+  const HandAxis* axis = HandAxisOf(kind);
+  return axis ? axis->group : 0U;
 }
 
 /// Which of Applied an axis feels, or -1.
@@ -380,7 +344,7 @@ void HostLink::BeginRunning()
   this->Shown.axes = 0;
   for (const CapsMessage& caps : this->Caps)
   {
-    this->Shown.axes |= AxesOf(caps.kind);
+    this->Shown.axes |= GroupOf(caps.kind);
   }
   this->At = Phase::Running;
   this->Failures = 0;
@@ -462,7 +426,7 @@ void HostLink::TrackAxis(std::size_t axis, std::int32_t count, double seconds, b
     static_cast<std::uint32_t>(count) - static_cast<std::uint32_t>(track.last));
   const double moved = std::abs(static_cast<double>(step) * caps.perCount);
   const bool glitch =
-    track.known && moved > FastestOf(caps.unit) * seconds + std::abs(caps.perCount);
+    track.known && moved > FastestOf(caps.kind) * seconds + std::abs(caps.perCount);
   this->Glitches += glitch ? 1 : 0;
   if (track.known && !glitch && !hold)
   {

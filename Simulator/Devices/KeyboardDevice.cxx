@@ -6,38 +6,16 @@ namespace coronary
 {
 namespace
 {
+// Bits of what is held: two for each axis, then these.
 enum Action : unsigned
 {
-  WireForward,
-  WireBack,
-  WireRight,
-  WireLeft,
-  CatheterForward,
-  CatheterBack,
-  CatheterRight,
-  CatheterLeft,
-  Inject,
-  Refill,
-  Fluoroscopy,
+  Fluoroscopy = 2 * HandAxes,
   Cine,
   Mask,
-  Lao,
-  Rao,
-  Cranial,
-  Caudal,
-  DetectorAway,
-  DetectorNear,
-  TableHead,
-  TableFeet,
-  TableLeft,
-  TableRight,
-  TableUp,
-  TableDown,
   FastLeft,
   FastRight,
   FineLeft,
-  FineRight,
-  Unknown
+  FineRight
 };
 
 struct Key
@@ -46,14 +24,14 @@ struct Key
   Action action;
 };
 
-constexpr Key Keys[] = { { "up", WireForward }, { "down", WireBack }, { "right", WireRight },
-  { "left", WireLeft }, { "w", CatheterForward }, { "s", CatheterBack }, { "d", CatheterRight },
-  { "a", CatheterLeft }, { "space", Inject }, { "backspace", Refill }, { "f", Fluoroscopy },
-  { "c", Cine }, { "m", Mask }, { "j", Rao }, { "l", Lao }, { "i", Cranial }, { "k", Caudal },
-  { "o", DetectorAway }, { "u", DetectorNear }, { "t", TableHead }, { "g", TableFeet },
-  { "h", TableLeft }, { "z", TableRight }, { "prior", TableUp }, { "next", TableDown },
+constexpr Key Keys[] = { { "f", Fluoroscopy }, { "c", Cine }, { "m", Mask },
   { "shift_l", FastLeft }, { "shift_r", FastRight }, { "control_l", FineLeft },
   { "control_r", FineRight } };
+
+std::uint64_t Bit(std::size_t action)
+{
+  return std::uint64_t{ 1 } << action;
+}
 
 std::uint64_t BitOf(const std::string& key)
 {
@@ -62,40 +40,35 @@ std::uint64_t BitOf(const std::string& key)
   {
     letter = static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
   }
+  for (std::size_t axis = 0; axis < HandAxes; ++axis)
+  {
+    if (name == HandAxisTable[axis].forward || name == HandAxisTable[axis].back)
+    {
+      return Bit(2 * axis + (name == HandAxisTable[axis].back ? 1 : 0));
+    }
+  }
   for (const Key& one : Keys)
   {
     if (name == one.name)
     {
-      return std::uint64_t{ 1 } << one.action;
+      return Bit(one.action);
     }
   }
   return 0;
 }
 
-bool Has(std::uint64_t held, Action action)
+bool Has(std::uint64_t held, std::size_t action)
 {
-  return (held >> action & 1) != 0;
-}
-
-double Wish(std::uint64_t held, Action forward, Action back)
-{
-  return (Has(held, forward) ? 1.0 : 0.0) - (Has(held, back) ? 1.0 : 0.0);
+  return (held & Bit(action)) != 0;
 }
 
 HandWishes WishesOf(std::uint64_t held, const HandSpeeds& speeds)
 {
   HandWishes wishes;
-  wishes.wire = Wish(held, WireForward, WireBack);
-  wishes.wireTurning = Wish(held, WireRight, WireLeft);
-  wishes.catheter = Wish(held, CatheterForward, CatheterBack);
-  wishes.catheterTurning = Wish(held, CatheterRight, CatheterLeft);
-  wishes.syringe = Wish(held, Inject, Refill);
-  wishes.primary = Wish(held, Lao, Rao);
-  wishes.secondary = Wish(held, Cranial, Caudal);
-  wishes.detector = Wish(held, DetectorAway, DetectorNear);
-  // LPS.
-  wishes.table = { Wish(held, TableLeft, TableRight), Wish(held, TableDown, TableUp),
-    Wish(held, TableHead, TableFeet) };
+  for (std::size_t axis = 0; axis < HandAxes; ++axis)
+  {
+    wishes.axes[axis] = (Has(held, 2 * axis) ? 1.0 : 0.0) - (Has(held, 2 * axis + 1) ? 1.0 : 0.0);
+  }
   if (Has(held, FineLeft) || Has(held, FineRight))
   {
     wishes.pace = speeds.fine;

@@ -21,10 +21,6 @@ std::uint64_t SteadyMicroseconds()
 constexpr double MostPeriods = 3.0; // between states that follow each other
 constexpr double Lost = 1e-6 * static_cast<double>(link_times::Lost); // s
 
-std::size_t IndexOf(AxisKind kind)
-{
-  return static_cast<std::size_t>(kind);
-}
 }
 
 SerialDevice::SerialDevice(const std::string& path)
@@ -93,17 +89,14 @@ void SerialDevice::Read(std::uint64_t /*tick*/, double secondsPerTick, InputFram
   frame = {};
   frame.axes = this->Latest.axes;
   frame.state = this->Silence < Lost ? this->Latest.state : DeviceState::Disconnected;
-  frame.inflation = this->Places[IndexOf(AxisKind::Inflation)];
+  frame.inflation = this->Places[static_cast<std::size_t>(AxisKind::Inflation)];
   SessionInput& input = frame.input;
-  input.drive = { this->Places[IndexOf(AxisKind::WireAdvance)],
-    this->Places[IndexOf(AxisKind::WireTurn)], this->Places[IndexOf(AxisKind::CatheterAdvance)],
-    this->Places[IndexOf(AxisKind::CatheterTurn)] };
-  input.syringe = this->Places[IndexOf(AxisKind::Syringe)];
-  input.primary = this->Places[IndexOf(AxisKind::Primary)];
-  input.secondary = this->Places[IndexOf(AxisKind::Secondary)];
-  input.sourceToDetector = this->Places[IndexOf(AxisKind::SourceToDetector)];
-  input.table = { this->Places[IndexOf(AxisKind::TableLeft)],
-    this->Places[IndexOf(AxisKind::TableBack)], this->Places[IndexOf(AxisKind::TableHead)] };
+  AxisPlaces places;
+  for (std::size_t axis = 0; axis < HandAxes; ++axis)
+  {
+    places[axis] = this->Places[static_cast<std::size_t>(HandAxisTable[axis].kind)];
+  }
+  SetPlaces(input, places);
   if (frame.state == DeviceState::Running || frame.state == DeviceState::Stale)
   {
     input.pedals = this->Latest.pedals;

@@ -65,6 +65,20 @@ void Guidewire::Validate() const
   }
 }
 
+double RestCurvature(const Guidewire& wire, double distance)
+{
+  double from = 0.0;
+  for (const WireSection& section : wire.sections)
+  {
+    from += section.length;
+    if (distance < from)
+    {
+      return section.restCurvature;
+    }
+  }
+  return 0.0;
+}
+
 double GuideCatheter::TurnedAngle(double behind) const
 {
   double angle = 0.0;

@@ -66,6 +66,9 @@ double AlongWire(const Guidewire& wire, double distance, Property property)
   return lastValue;
 }
 
+/// Curvature at rest at a distance from the tip, 1/mm: that of the section, all along it; 0 behind the last one.
+double RestCurvature(const Guidewire& wire, double distance);
+
 /// A piece of a guide catheter's shape, counted from its tip.
 struct CatheterArc
 {

@@ -1,6 +1,5 @@
 #include "Intervention.h"
 
-#include "CatheterFriction.h"
 #include "CatheterPath.h"
 #include "CosseratRod.h"
 #include "CyclicTime.h"
@@ -8,6 +7,7 @@
 #include "Fnv1a.h"
 #include "VesselWall.h"
 #include "WallMotion.h"
+#include "WireInGuide.h"
 
 #include <algorithm>
 #include <cmath>
@@ -38,21 +38,6 @@ void RequireWithin(double value, double low, double high, const char* name)
     std::snprintf(text, sizeof(text), "%s must be within %g .. %g, not %g", name, low, high, value);
     throw std::invalid_argument(text);
   }
-}
-
-/// Curvature at rest is that of the section, all along it.
-double RestCurvature(const Guidewire& wire, double distance)
-{
-  double from = 0.0;
-  for (const WireSection& section : wire.sections)
-  {
-    from += section.length;
-    if (distance < from)
-    {
-      return section.restCurvature;
-    }
-  }
-  return 0.0;
 }
 
 enum class Notice : int
@@ -132,19 +117,19 @@ struct Intervention::Internals : ContactSurface
   double Fed = 0.0; // mm, where the tip would be on the straightened way: its u without bends
   double HandPosition = 0.0; // as accepted
   double HandAngle = 0.0;
-  double Spring = 0.0;      // N mm/rad, of the wire in the catheter
   double CatheterTip = 0.0; // u
   double CatheterAngle = 0.0;
-  double HandSpeed = 0.0;    // mm/s
-  double HandTurning = 0.0;  // rad/s
-  CatheterFriction Friction; // of the catheter behind the rod
+  double LastFed = 0.0; // of the tick before
+  double LastCatheterTip = 0.0;
+  double LastCatheterAngle = 0.0;
+  WireInGuide Behind; // the wire between the rod and the hand
 
   struct Sane
   {
     std::vector<Vector3> position;
     std::vector<Eigen::Quaterniond> orientation;
     double fed = 0.0;
-    double lag = 0.0;
+    double angle = 0.0; // of the rod's end
   };
   Sane Last;
 
@@ -226,11 +211,13 @@ struct Intervention::Internals : ContactSurface
   void Engage(const std::vector<Vector3>& points);
   WallTopology EngagedTree();
   Eigen::Quaterniond HeldOrientation(const PathPlace& place) const;
+  double EndAngle() const;
   void AppendSegment();
   void PlaceOnPath();
   void BeginFrame();
   void Drive(const DriveInput& input);
   void Feed();
+  void DriveBehind();
   void PutBack();
   void Reset();
   void KeepSane();
@@ -442,13 +429,20 @@ WallTopology Intervention::Internals::EngagedTree()
 
 Eigen::Quaterniond Intervention::Internals::HeldOrientation(const PathPlace& place) const
 {
-  const Vector3 first = std::cos(this->HandAngle) * place.side +
-    std::sin(this->HandAngle) * place.tangent.cross(place.side);
+  const double angle = this->Behind.Angle();
+  const Vector3 first =
+    std::cos(angle) * place.side + std::sin(angle) * place.tangent.cross(place.side);
   Matrix3 frame;
   frame.col(2) = -place.tangent; // from the tip backwards
   frame.col(0) = first;
   frame.col(1) = frame.col(2).cross(frame.col(0));
   return Eigen::Quaterniond(frame);
+}
+
+/// By which the rod's end is turned: it lags behind what it hangs on.
+double Intervention::Internals::EndAngle() const
+{
+  return this->Behind.Angle() - this->Rod->Lag(this->Rod->Size() - 1);
 }
 
 void Intervention::Internals::AppendSegment()
@@ -496,8 +490,6 @@ void Intervention::Internals::Drive(const DriveInput& input)
     !std::isfinite(input.catheterPosition) || !std::isfinite(input.catheterAngle))
   {
     this->Say(Notice::NotFinite);
-    this->HandSpeed = 0.0;
-    this->HandTurning = 0.0;
     return;
   }
   const double most = this->Settings.maximumSpeed * this->Step;
@@ -516,8 +508,6 @@ void Intervention::Internals::Drive(const DriveInput& input)
   }
   this->HandAngle += turn;
   this->HandPosition += way;
-  this->HandSpeed = way / this->Step;
-  this->HandTurning = turn / this->Step;
   this->Fed += way;
 
   // The catheter is moved by a hand, too: slowly.
@@ -535,7 +525,7 @@ void Intervention::Internals::Drive(const DriveInput& input)
 
 void Intervention::Internals::Feed()
 {
-  const double lag = this->Rod->Lag(this->Rod->Size() - 1);
+  const double torque = this->Behind.Stiffness() * this->Rod->Lag(this->Rod->Size() - 1);
   const double datum = this->CatheterTip - this->Settings.insideCatheter;
   const double minimum = datum + this->Places[MinimumSegments - 1];
   if (this->Fed < minimum)
@@ -549,6 +539,7 @@ void Intervention::Internals::Feed()
     this->Say(Notice::WireAtEnd);
     this->Fed = most;
   }
+  this->DriveBehind();
   while (this->Fed - this->Places[this->Rod->Size() - 1] > datum &&
     this->Rod->Size() < this->Settings.capacity)
   {
@@ -563,8 +554,18 @@ void Intervention::Internals::Feed()
   const std::int64_t last = this->Rod->Size() - 1;
   const PathPlace place = this->Path->At(this->Fed - this->Places[last]);
   this->Rod->Prescribe(last, place.position, this->HeldOrientation(place));
-  // The wire between there and the hand, inside of the catheter, is a torsion spring.
-  this->Rod->HangOnSpring(last, this->Spring, lag);
+  this->Rod->HangOnSpring(last, this->Behind.Stiffness(), torque / this->Behind.Stiffness());
+}
+
+/// The wire behind the rod, within the guide: what the rod's end hangs on.
+void Intervention::Internals::DriveBehind()
+{
+  const double tip = this->CatheterTip - this->LastCatheterTip;
+  this->Behind.Drive(this->Fed - this->CatheterTip, this->Fed - this->LastFed - tip,
+    this->HandAngle, this->CatheterAngle - this->LastCatheterAngle);
+  this->LastFed = this->Fed;
+  this->LastCatheterTip = this->CatheterTip;
+  this->LastCatheterAngle = this->CatheterAngle;
 }
 
 void Intervention::Internals::PutBack()
@@ -610,13 +611,15 @@ void Intervention::Internals::KeepSane()
     this->Last.orientation.push_back(this->Rod->Orientation(i));
   }
   this->Last.fed = this->Fed;
-  this->Last.lag = this->Rod->Lag(this->Rod->Size() - 1);
+  this->Last.angle = this->EndAngle();
 }
 
 void Intervention::Internals::Reset()
 {
   this->Say(Notice::Reset);
-  this->Fed = this->Last.fed;
+  this->Fed = this->LastFed = this->Last.fed;
+  this->Behind.Rest(this->HandAngle, this->Last.angle);
+  this->DriveBehind();
   const std::int64_t count = static_cast<std::int64_t>(this->Last.position.size());
   while (this->Rod->Size() > count)
   {
@@ -631,7 +634,8 @@ void Intervention::Internals::Reset()
   {
     this->Rod->Place(i, this->Last.position[i], this->Last.orientation[i]);
   }
-  this->Rod->HangOnSpring(count - 1, this->Spring, this->Last.lag);
+  this->Rod->HangOnSpring(
+    count - 1, this->Behind.Stiffness(), this->Behind.Angle() - this->Last.angle);
 }
 
 void Intervention::Internals::Measure()
@@ -676,9 +680,8 @@ void Intervention::Internals::Measure()
   Vector3 torque;
   this->Rod->Reaction(last, force, torque);
   const Vector3 forward = -this->Rod->Axis(last);
-  const HandLoad felt =
-    this->Friction.AtHand({ force.dot(forward), this->Spring * this->Rod->Lag(last) },
-      this->HandSpeed, this->HandTurning);
+  this->Behind.Settle(force.dot(forward), this->EndAngle());
+  const HandLoad& felt = this->Behind.AtHand();
   report.proximalForce = felt.force;
   report.proximalTorque = felt.torque;
   if (report.inserted <= 0.0)
@@ -711,17 +714,11 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   data.Wire = wire;
   data.Catheter = catheter;
   data.Settings = settings;
-  // The rod itself rubs on the catheter's end.
-  data.Friction = CatheterFriction(catheter.friction *
-      (catheter.TurnedAngle(catheter.length) - catheter.TurnedAngle(settings.insideCatheter)),
-    AlongWire(wire, 0.5 * wire.length, [](const WireSection& s) { return s.radius; }));
+  data.Behind = WireInGuide(wire, catheter, settings.insideCatheter);
   data.Step = 1.0 / settings.tickRate;
   data.FrameSeconds = data.Step * settings.ticksPerFrame;
   data.Phase = Modulo(settings.startPhase);
   data.MakeSegments();
-  data.Spring =
-    AlongWire(wire, 0.5 * wire.length, [](const WireSection& s) { return s.torsionalStiffness; }) /
-    catheter.length;
   data.Motion->Positions(data.Phase, data.NextPoints);
   data.LastPoints = data.NextPoints;
   data.Engage(data.NextPoints);
@@ -735,7 +732,9 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   data.Line.reserve(settings.capacity + 1);
   data.Last.position.reserve(settings.capacity);
   data.Last.orientation.reserve(settings.capacity);
-  data.Fed = data.CatheterTip - StartInside;
+  data.Fed = data.LastFed = data.CatheterTip - StartInside;
+  data.LastCatheterTip = data.CatheterTip;
+  data.DriveBehind();
   data.PlaceOnPath();
   data.KeepSane();
 }
@@ -853,7 +852,7 @@ std::uint64_t Intervention::StateHash() const
   {
     hash = Fnv1a(&value, sizeof(value), hash);
   }
-  return hash;
+  return data.Behind.Hash(hash);
 }
 
 std::vector<std::string> Intervention::TakeMessages()

@@ -12,16 +12,9 @@ namespace coronary
 {
 namespace
 {
-constexpr double Degree = M_PI / 180.0;
 constexpr std::size_t MostPieces = 100000;
 constexpr double LongestPiece = 36000.0; // s
-constexpr double FurthestAdvance =
-  1e6; // mm: what is absurd is clamped by the simulation, with a message
-constexpr double MaximumTurn = 1e7; // degrees
 constexpr double MaximumHeartRate = 240.0;
-constexpr double MostContrast = 1000.0;  // mL
-constexpr double MaximumAngle = 360.0;   // degrees, of the C-arm
-constexpr double FurthestTable = 1000.0; // mm
 
 std::uint32_t PedalsOf(JsonFields& fields)
 {
@@ -54,18 +47,12 @@ DrivePiece PieceOf(JsonFields& member)
 {
   DrivePiece piece;
   piece.seconds = member.Number("seconds", 0.0, LongestPiece);
-  const auto advance = [&](const char* name, double most)
-  { return member.Number(name, -most, most, 0.0); };
-  piece.wireAdvance = advance("wire_mm", FurthestAdvance);
-  piece.wireTurn = Degree * advance("wire_deg", MaximumTurn);
-  piece.catheterAdvance = advance("catheter_mm", FurthestAdvance);
-  piece.catheterTurn = Degree * advance("catheter_deg", MaximumTurn);
-  piece.inject = member.Number("inject_mL", 0.0, MostContrast, 0.0);
-  piece.primaryTurn = Degree * advance("primary_deg", MaximumAngle);
-  piece.secondaryTurn = Degree * advance("secondary_deg", MaximumAngle);
-  piece.detectorLift = advance("source_to_detector_mm", FurthestTable);
-  piece.tableMove = { advance("table_x_mm", FurthestTable), advance("table_y_mm", FurthestTable),
-    advance("table_z_mm", FurthestTable) };
+  for (std::size_t axis = 0; axis < HandAxes; ++axis)
+  {
+    const HandAxis& one = HandAxisTable[axis];
+    const double least = one.kind == AxisKind::Syringe ? 0.0 : -one.scriptMost;
+    piece.change[axis] = one.scriptUnit * member.Number(one.scripted, least, one.scriptMost, 0.0);
+  }
   piece.setsPedals = member.Has("pedals");
   piece.pedals = piece.setsPedals ? PedalsOf(member) : 0U;
   piece.setsHeartRate = member.Has("heart_rate_bpm");
@@ -77,54 +64,27 @@ DrivePiece PieceOf(JsonFields& member)
 
 namespace
 {
-void Move(SessionInput& input, const DrivePiece& piece, double share)
+void Move(AxisPlaces& places, const AxisPlaces& change, double share)
 {
-  input.drive.wirePosition += share * piece.wireAdvance;
-  input.drive.wireAngle += share * piece.wireTurn;
-  input.drive.catheterPosition += share * piece.catheterAdvance;
-  input.drive.catheterAngle += share * piece.catheterTurn;
-  input.syringe += share * piece.inject;
-  input.primary += share * piece.primaryTurn;
-  input.secondary += share * piece.secondaryTurn;
-  input.sourceToDetector += share * piece.detectorLift;
-  input.table += share * piece.tableMove;
-}
-
-SessionInput Nothing()
-{
-  SessionInput nothing;
-  nothing.sourceToDetector = 0.0;
-  return nothing;
-}
-
-SessionInput Sum(SessionInput start, const SessionInput& moved)
-{
-  start.drive.wirePosition += moved.drive.wirePosition;
-  start.drive.wireAngle += moved.drive.wireAngle;
-  start.drive.catheterPosition += moved.drive.catheterPosition;
-  start.drive.catheterAngle += moved.drive.catheterAngle;
-  start.syringe += moved.syringe;
-  start.primary += moved.primary;
-  start.secondary += moved.secondary;
-  start.sourceToDetector += moved.sourceToDetector;
-  start.table += moved.table;
-  start.pedals |= moved.pedals;
-  return start;
+  for (std::size_t axis = 0; axis < HandAxes; ++axis)
+  {
+    places[axis] += share * change[axis];
+  }
 }
 }
 
 DriveScript::DriveScript(std::vector<DrivePiece> pieces)
   : Pieces(std::move(pieces))
 {
-  Start start{ 0.0, Nothing() };
+  Start start;
   for (const DrivePiece& piece : this->Pieces)
   {
-    start.moved.pedals = piece.setsPedals ? piece.pedals : start.moved.pedals;
+    start.pedals = piece.setsPedals ? piece.pedals : start.pedals;
     this->Starts.push_back(start);
     start.time += piece.seconds;
-    Move(start.moved, piece, 1.0);
+    Move(start.moved, piece.change, 1.0);
   }
-  start.moved.pedals = 0;
+  start.pedals = 0;
   this->Starts.push_back(start);
   this->Total = start.time;
 }
@@ -138,12 +98,17 @@ SessionInput DriveScript::At(double seconds, const SessionInput& start) const
     return start;
   }
   const auto n = static_cast<std::size_t>(after - this->Starts.begin() - 1);
-  SessionInput moved = this->Starts[n].moved;
+  AxisPlaces moved = this->Starts[n].moved;
   if (n < this->Pieces.size())
   {
-    Move(moved, this->Pieces[n], (seconds - this->Starts[n].time) / this->Pieces[n].seconds);
+    Move(moved, this->Pieces[n].change, (seconds - this->Starts[n].time) / this->Pieces[n].seconds);
   }
-  return Sum(start, moved);
+  AxisPlaces places = PlacesOf(start);
+  Move(places, moved, 1.0);
+  SessionInput input = start;
+  SetPlaces(input, places);
+  input.pedals |= this->Starts[n].pedals;
+  return input;
 }
 
 std::vector<double> DriveScript::HeartRates(double from, double to) const

@@ -5,7 +5,7 @@
 #ifndef DynamicCoronary_DriveScript_h
 #define DynamicCoronary_DriveScript_h
 
-#include "SessionInput.h"
+#include "HandAxes.h"
 
 #include <string>
 #include <vector>
@@ -15,20 +15,12 @@ namespace coronary
 /// Even motion for some seconds; changes are against the end of the piece before.
 struct DrivePiece
 {
-  double seconds = 0.0;                 ///< 0: at once
-  double wireAdvance = 0.0;             ///< mm
-  double wireTurn = 0.0;                ///< radians
-  double catheterAdvance = 0.0;         ///< mm
-  double catheterTurn = 0.0;            ///< radians
-  double inject = 0.0;                  ///< mL
-  double primaryTurn = 0.0;             ///< of the C-arm, radians towards LAO
-  double secondaryTurn = 0.0;           ///< radians towards cranial
-  double detectorLift = 0.0;            ///< mm of the source to the detector
-  Vector3 tableMove{ Vector3::Zero() }; ///< mm of the isocentre in the patient
-  bool setsPedals = false;              ///< when the piece begins
-  std::uint32_t pedals = 0;             ///< bits of Pedal; until they are set again
-  bool setsHeartRate = false;           ///< when the piece begins
-  double heartRate = 0.0;               ///< beats a minute
+  double seconds = 0.0;       ///< 0: at once
+  AxisPlaces change{};        ///< units of HandAxisTable
+  bool setsPedals = false;    ///< when the piece begins
+  std::uint32_t pedals = 0;   ///< bits of Pedal; until they are set again
+  bool setsHeartRate = false; ///< when the piece begins
+  double heartRate = 0.0;     ///< beats a minute
 };
 
 class DriveScript
@@ -49,8 +41,9 @@ public:
 private:
   struct Start
   {
-    double time;
-    SessionInput moved; ///< by all pieces before; the pedals of this one
+    double time = 0.0;
+    AxisPlaces moved{};       ///< by all pieces before
+    std::uint32_t pedals = 0; ///< of this one
   };
 
   std::vector<DrivePiece> Pieces;

@@ -1,6 +1,7 @@
 #include "Recording.h"
 
 #include "AtomicFile.h"
+#include "HandAxes.h"
 #include "JsonFields.h"
 #include "WallMotion.h"
 
@@ -26,28 +27,30 @@ constexpr std::uint32_t MostHeader = 16U << 20;
 constexpr std::uint32_t MostPayload = 1U << 20;
 constexpr std::uint64_t MostTicks = std::uint64_t{ 1 } << 40; // 17 years at 2 kHz
 constexpr std::size_t FramesOfChunk = 100;
-struct AxisInfo
-{
-  const char* name;
-  const char* unit;
-};
+/// In the order of their bits in the mask of a frame: what moves often comes first. The pedals are behind the syringe.
+constexpr std::size_t Axes = HandAxes + 1;
+constexpr std::size_t PedalAxis = IndexOf(AxisKind::Syringe) + 1;
 
-/// In the order of their bits in the mask of a frame: what moves often comes first.
-constexpr std::array AxisTable{ AxisInfo{ "wire_position", "mm" }, AxisInfo{ "wire_angle", "rad" },
-  AxisInfo{ "catheter_position", "mm" }, AxisInfo{ "catheter_angle", "rad" },
-  AxisInfo{ "syringe", "mL" }, AxisInfo{ "pedals", "bits" }, AxisInfo{ "primary", "rad" },
-  AxisInfo{ "secondary", "rad" }, AxisInfo{ "source_to_detector", "mm" },
-  AxisInfo{ "table_x", "mm" }, AxisInfo{ "table_y", "mm" }, AxisInfo{ "table_z", "mm" } };
-constexpr std::size_t Axes = AxisTable.size();
+const char* AxisName(std::size_t axis)
+{
+  return axis == PedalAxis ? "pedals" : HandAxisTable[axis - (axis > PedalAxis ? 1 : 0)].recorded;
+}
+
+const char* AxisUnitName(std::size_t axis)
+{
+  return axis == PedalAxis ? "bits"
+                           : UnitName(HandAxisTable[axis - (axis > PedalAxis ? 1 : 0)].unit);
+}
+
 constexpr std::size_t DriveAxes = 4; ///< recordings may have only these, the first ones
 
 std::array<std::uint64_t, Axes> BitsOf(const SessionInput& input)
 {
-  const DriveInput& drive = input.drive;
-  const std::array<double, Axes> values{ drive.wirePosition, drive.wireAngle,
-    drive.catheterPosition, drive.catheterAngle, input.syringe, static_cast<double>(input.pedals),
-    input.primary, input.secondary, input.sourceToDetector, input.table.x(), input.table.y(),
-    input.table.z() };
+  const AxisPlaces places = PlacesOf(input);
+  std::array<double, Axes> values{};
+  std::copy_n(places.begin(), PedalAxis, values.begin());
+  values[PedalAxis] = static_cast<double>(input.pedals);
+  std::copy(places.begin() + PedalAxis, places.end(), values.begin() + PedalAxis + 1);
   std::array<std::uint64_t, Axes> bits{};
   std::memcpy(bits.data(), values.data(), sizeof(bits));
   return bits;
@@ -63,14 +66,12 @@ SessionInput InputOf(const std::array<std::uint64_t, Axes>& bits)
 {
   std::array<double, Axes> values{};
   std::memcpy(values.data(), bits.data(), sizeof(values));
+  AxisPlaces places{};
+  std::copy_n(values.begin(), PedalAxis, places.begin());
+  std::copy(values.begin() + PedalAxis + 1, values.end(), places.begin() + PedalAxis);
   SessionInput input;
-  input.drive = { values[0], values[1], values[2], values[3] };
-  input.syringe = values[4];
-  input.pedals = PedalsOf(values[5]);
-  input.primary = values[6];
-  input.secondary = values[7];
-  input.sourceToDetector = values[8];
-  input.table = { values[9], values[10], values[11] };
+  SetPlaces(input, places);
+  input.pedals = PedalsOf(values[PedalAxis]);
   return input;
 }
 
@@ -168,9 +169,9 @@ std::uint64_t HexadecimalOf(JsonFields& fields, const char* name)
 std::string HeaderText(const RecordingHeader& header)
 {
   Json axes = Json::array();
-  for (const AxisInfo& axis : AxisTable)
+  for (std::size_t axis = 0; axis < Axes; ++axis)
   {
-    axes.push_back({ { "name", axis.name }, { "unit", axis.unit } });
+    axes.push_back({ { "name", AxisName(axis) }, { "unit", AxisUnitName(axis) } });
   }
   const Json scenario =
     header.scenario.empty() ? Json::object() : ParseBoundedJson(header.scenario, "The scenario");
@@ -207,7 +208,7 @@ RecordingHeader HeaderOf(const std::string& text, const std::string& origin, std
   bool same = axes.size() == Axes || axes.size() == DriveAxes;
   for (std::size_t n = 0; same && n < axes.size(); ++n)
   {
-    same = axes[n] == Json{ { "name", AxisTable[n].name }, { "unit", AxisTable[n].unit } };
+    same = axes[n] == Json{ { "name", AxisName(n) }, { "unit", AxisUnitName(n) } };
   }
   if (!same)
   {

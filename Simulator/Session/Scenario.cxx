@@ -1,6 +1,7 @@
 #include "Scenario.h"
 
 #include "EmbeddedFiles.h"
+#include "HandAxes.h"
 #include "InstrumentJson.h"
 #include "JsonFields.h"
 #include "TextFile.h"
@@ -323,8 +324,9 @@ ImagingSettings ImagingOf(const Json& object, const std::string& where, const st
   imaging.thoraxSeed = static_cast<std::uint64_t>(
     fields.Whole("thorax_seed", 0, INT32_MAX, static_cast<std::int64_t>(imaging.thoraxSeed)));
   CArmPose& pose = imaging.pose;
-  pose.primary = AngleOf(fields, "primary", 100.0, pose.primary);
-  pose.secondary = AngleOf(fields, "secondary", 50.0, pose.secondary);
+  const auto steepest = [](AxisKind kind) { return HandAxisTable[IndexOf(kind)].high / Degree; };
+  pose.primary = AngleOf(fields, "primary", steepest(AxisKind::Primary), pose.primary);
+  pose.secondary = AngleOf(fields, "secondary", steepest(AxisKind::Secondary), pose.secondary);
   pose.sourceToIsocentre =
     fields.Number("source_to_isocentre_mm", 400.0, 1200.0, pose.sourceToIsocentre);
   pose.sourceToDetector = fields.Number(

@@ -1,6 +1,7 @@
 #include "TrainingSession.h"
 
 #include "Fnv1a.h"
+#include "HandAxes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,9 +13,7 @@ namespace
 {
 constexpr double ContrastStep = 0.005;    // s
 constexpr double FastestInjection = 12.0; // mL/s: no hand and no injector of a laboratory does more
-constexpr double SteepestPrimary = 120.0 * M_PI / 180.0; // what the arm of a laboratory can do
-constexpr double SteepestSecondary = 55.0 * M_PI / 180.0;
-constexpr double NearestDetector = 50.0;    // mm behind the isocentre
+constexpr double NearestDetector = 50.0;  // mm behind the isocentre
 constexpr double FurthestDetector = 1500.0; // mm from the source
 constexpr double FurthestTable = 500.0;     // mm
 constexpr double MinimumField = 80.0;       // mm
@@ -101,9 +100,10 @@ void TrainingSession::Internals::SetView(const SessionInput& input)
 {
   const CArmPose before = this->Pose;
   const CArmPose& start = this->Imaging.pose;
-  this->Pose.primary = Limited(input.primary, -SteepestPrimary, SteepestPrimary, before.primary);
-  this->Pose.secondary =
-    Limited(input.secondary, -SteepestSecondary, SteepestSecondary, before.secondary);
+  constexpr HandAxis Primary = HandAxisTable[IndexOf(AxisKind::Primary)];
+  constexpr HandAxis Secondary = HandAxisTable[IndexOf(AxisKind::Secondary)];
+  this->Pose.primary = Limited(input.primary, Primary.low, Primary.high, before.primary);
+  this->Pose.secondary = Limited(input.secondary, Secondary.low, Secondary.high, before.secondary);
   this->Pose.sourceToDetector = Limited(input.sourceToDetector,
     start.sourceToIsocentre + NearestDetector, FurthestDetector, before.sourceToDetector);
   for (int axis = 0; axis < 3; ++axis)

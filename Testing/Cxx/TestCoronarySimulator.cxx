@@ -8,6 +8,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <array>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -305,6 +307,67 @@ TEST_F(TestCoronarySimulator, RefusesWrongImagesAndContrast)
     this->Put("changed.json", scenario);
     this->ExpectFailure(1, "--scenario changed.json --ticks 10 --xray", part);
   }
+}
+
+// forces.csv of a wire that the artery holds (wall_friction_factor 6) and that is pulled out through a JL4 guide.
+TEST_F(TestCoronarySimulator, AScriptedWithdrawalResistsThePullAndTheGuideAddsToIt)
+{
+  ASSERT_EQ(this->Run("--scenario phantom-lca --catheter JL4-6F --print-scenario"), 0)
+    << this->Said();
+  json scenario = json::parse(ReadText(this->Folder / "stdout"));
+  scenario["settings"]["wall_friction_factor"] = 6.0;
+  scenario["vessels"]["phantom"]["surface_spacing_mm"] = 1.0;
+  const double friction = scenario["catheter"]["friction"];
+  ASSERT_EQ(friction, 0.08);
+  // Mean over the push, the rest and the pull, without the times in which friction turns round.
+  std::array<std::array<double, 3>, 2> means{};
+  for (const bool rubs : { false, true })
+  {
+    scenario["catheter"]["friction"] = rubs ? friction : 0.0;
+    this->Put("withdrawal.json", scenario);
+    ASSERT_EQ(
+      this->Run("--headless --quiet --scenario withdrawal.json --output-rate 100 --output w "
+                "--script '" DYNAMICCORONARY_DRIVING "/withdrawal.json'"),
+      0)
+      << this->Said();
+    std::istringstream table(ReadText(this->Folder / "w/forces.csv"));
+    std::string line;
+    std::getline(table, line);
+    ASSERT_EQ(line.rfind("tick,seconds,phase,inserted_mm,proximal_force_N,", 0), 0U);
+    std::array<int, 3> counts{};
+    while (std::getline(table, line))
+    {
+      double seconds = 0.0;
+      double force = 0.0;
+      ASSERT_EQ(std::sscanf(line.c_str(), "%*d,%lf,%*f,%*f,%lf", &seconds, &force), 2) << line;
+      const int part = seconds > 3.0 && seconds < 4.0 ? 0
+        : seconds > 4.2 && seconds < 4.5              ? 1
+        : seconds > 4.7                               ? 2
+                                                      : -1;
+      if (part >= 0)
+      {
+        means[rubs][part] += force;
+        ++counts[part];
+      }
+    }
+    for (int part = 0; part < 3; ++part)
+    {
+      ASSERT_GT(counts[part], 25);
+      means[rubs][part] /= counts[part];
+    }
+  }
+  const auto& [smooth, rough] = means;
+  EXPECT_GT(smooth[0], 0.02) << "pushed: it resists";
+  EXPECT_LT(smooth[2], -0.02) << "pulled: it resists";
+  // Bends of 5 rad beyond the simulated end: exp(0.08 * 5) = 1.5, and what the wire's stiffness presses on top.
+  EXPECT_GT(rough[0], 1.5 * smooth[0]);
+  EXPECT_LT(rough[2], 1.5 * smooth[2]);
+  EXPECT_GT(rough[1], smooth[1])
+    << "at rest the guide still holds against the hand's last movement";
+  std::printf("| withdrawal through a JL4 guide, N felt: pushed, at rest, pulled | without "
+              "friction %.3f, %.3f, "
+              "%.3f | %.3f, %.3f, %.3f | |\n",
+    smooth[0], smooth[1], smooth[2], rough[0], rough[1], rough[2]);
 }
 
 TEST_F(TestCoronarySimulator, RefusesInstrumentsThatDoNotFit)

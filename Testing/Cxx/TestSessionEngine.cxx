@@ -249,6 +249,46 @@ TEST_F(TestSessionEngine, RunsAndItsRecordingRepeatsToTheBit)
   EXPECT_TRUE(fs::exists(again.record));
 }
 
+TEST_F(TestSessionEngine, AReplayThatIsChangedByHandGoesOnAndIsNotComparedAnyMore)
+{
+  const Scenario& scenario = World().scenario;
+  const std::string file = this->Path("a.pcirec");
+  {
+    SessionRunner runner(World().wall, scenario, World().wallHash,
+      std::make_unique<ScriptSource>(
+        Driving(), StartInputOf(scenario), scenario.settings.tickRate, false));
+    runner.maximumTicks = 3500;
+    runner.Record(file, "test", "");
+    while (runner.Run(64))
+    {
+    }
+    EXPECT_EQ(runner.Tick(), 3500U);
+    runner.FinishRecording();
+  }
+  for (const bool changed : { false, true })
+  {
+    SessionRunner runner(
+      World().wall, scenario, World().wallHash, std::make_unique<ReplaySource>(file));
+    std::string said;
+    runner.say = [&](std::uint64_t, const std::string& text) { said += text; };
+    EXPECT_TRUE(runner.Run(2500));
+    EXPECT_EQ(runner.Compared().compared, 2U);
+    if (changed)
+    {
+      runner.Post({ RecordedEvent::HeartRate, 111.0 });
+      runner.Post({ RecordedEvent::HeartRate, 50.0 });
+    }
+    EXPECT_FALSE(runner.Run(10000));
+    EXPECT_EQ(runner.Tick(), 3500U);
+    SessionSnapshot now;
+    runner.Session().SnapshotOfImage(now);
+    EXPECT_EQ(now.heartRate, changed ? 50.0 : 90.0);
+    EXPECT_EQ(runner.Compared().compared, changed ? 2U : 4U);
+    EXPECT_EQ(runner.Compared().equal, runner.Compared().compared);
+    EXPECT_EQ(said.find("not compared any more") != std::string::npos, changed) << said;
+  }
+}
+
 TEST_F(TestSessionEngine, PausesAreNotMadeUpFor)
 {
   std::atomic<double> time{ 0.0 };

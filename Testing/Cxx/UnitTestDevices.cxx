@@ -6,6 +6,7 @@
 #include "KeyboardDevice.h"
 #include "RecordedDevices.h"
 #include "Recording.h"
+#include "RingQueue.h"
 #include "ScriptedDevice.h"
 
 #include "Refusals.h"
@@ -17,6 +18,7 @@
 #include <fstream>
 #include <limits>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -1035,11 +1037,86 @@ TEST(KeyboardDevice, SpeedsAndSmoothness)
 TEST(KeyboardDevice, WrongSpeeds)
 {
   HandSpeeds speeds;
-  speeds.wire = -1.0;
-  ExpectRefusal([&] { KeyboardDevice keys(speeds); }, "'wire'");
-  speeds.wire = 1.0;
+  speeds.most[0] = -1.0;
+  ExpectRefusal([&] { KeyboardDevice keys(speeds); }, "'wire_position'");
+  speeds.most[0] = 1.0;
   speeds.settling = 0.0;
   ExpectRefusal([&] { KeyboardDevice keys(speeds); }, "'settling'");
+}
+
+TEST(HandAxes, OneTableForDevicesKeysScriptsAndRecordings)
+{
+  std::set<std::string> names;
+  AxisPlaces places{};
+  for (std::size_t n = 0; n < HandAxes; ++n)
+  {
+    const HandAxis& axis = HandAxisTable[n];
+    EXPECT_EQ(static_cast<std::size_t>(axis.kind), n + 1)
+      << "the protocol's numbers go with places";
+    EXPECT_EQ(HandAxisOf(axis.kind), &axis);
+    EXPECT_LT(axis.low, axis.high);
+    EXPECT_GT(axis.fastest, axis.speed);
+    for (const char* name : { axis.recorded, axis.scripted, axis.forward, axis.back })
+    {
+      EXPECT_TRUE(names.insert(name).second || axis.recorded == std::string(name)) << name;
+    }
+    places[n] = 1.0 + static_cast<double>(n);
+
+    // Its keys move it and nothing else; so does a script.
+    for (const bool forward : { true, false })
+    {
+      KeyboardDevice keys;
+      InputFrame frame;
+      keys.Read(0, Tick, frame);
+      const AxisPlaces before = PlacesOf(frame.input);
+      EXPECT_TRUE(keys.Press(forward ? axis.forward : axis.back));
+      for (int k = 1; k < 2000; ++k)
+      {
+        keys.Read(k, Tick, frame);
+      }
+      const AxisPlaces after = PlacesOf(frame.input);
+      for (std::size_t m = 0; m < HandAxes; ++m)
+      {
+        const double expected = m == n ? (forward ? axis.speed : -axis.speed) : 0.0;
+        EXPECT_NEAR(after[m] - before[m], expected, 0.1 * axis.speed) << axis.recorded;
+      }
+    }
+    const DriveScript script = DriveScriptFromText(
+      R"({ "format": "dynamiccoronary script", "version": 1, "pieces": [ { "seconds": 1, ")" +
+        std::string(axis.scripted) + R"(": 10 } ] })",
+      "'script'");
+    const AxisPlaces scripted = PlacesOf(script.At(1.0));
+    const AxisPlaces start = PlacesOf(SessionInput());
+    for (std::size_t m = 0; m < HandAxes; ++m)
+    {
+      EXPECT_NEAR(scripted[m] - start[m], m == n ? 10.0 * axis.scriptUnit : 0.0, 1e-12);
+    }
+  }
+  EXPECT_EQ(HandAxisOf(AxisKind::None), nullptr);
+  EXPECT_EQ(HandAxisOf(AxisKind::Inflation), nullptr);
+  SessionInput input;
+  SetPlaces(input, places);
+  EXPECT_EQ(PlacesOf(input), places);
+}
+
+TEST(RingQueue, KeepsOrderAndRefusesWhenFull)
+{
+  RingQueue<std::string, 4> queue;
+  std::string value;
+  EXPECT_FALSE(queue.Pop(value));
+  for (int round = 0; round < 3; ++round)
+  {
+    EXPECT_TRUE(queue.Push("a"));
+    EXPECT_TRUE(queue.Push("b"));
+    EXPECT_TRUE(queue.Push("c"));
+    EXPECT_FALSE(queue.Push("d"));
+    for (const char* wanted : { "a", "b", "c" })
+    {
+      EXPECT_TRUE(queue.Pop(value));
+      EXPECT_EQ(value, wanted);
+    }
+    EXPECT_FALSE(queue.Pop(value));
+  }
 }
 
 TEST(TripleBuffer, LatestWhole)

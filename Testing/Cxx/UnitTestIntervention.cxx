@@ -101,24 +101,37 @@ TEST(Intervention, FollowsTheBeatingWall)
   EXPECT_LT((last - before).norm(), 8.0) << "after two beats it is back, but for what slid";
 }
 
-TEST(Intervention, AWireThatIsPulledResistsThePull)
+TEST(Intervention, AWireThatIsHeldResistsThePullAndTheGuideAddsToIt)
 {
-  Intervention intervention(Phantom(), Wire("workhorse"), Catheter("JL4-6F"), SettingsFor("LCA"));
-  DriveInput input;
-  const auto meanForce = [&](double speed, int ticks)
+  std::array<double, 2> pushed{};
+  std::array<double, 2> pulled{};
+  for (const bool rubs : { false, true })
   {
-    double sum = 0.0;
-    for (int k = 0; k < ticks; ++k)
+    GuideCatheter guide = Catheter("JL4-6F");
+    guide.friction = rubs ? guide.friction : 0.0;
+    InterventionSettings settings = SettingsFor("LCA");
+    settings.wallFriction = 6.0;
+    Intervention intervention(Phantom(), Wire("workhorse"), guide, settings);
+    DriveInput input;
+    const auto meanForce = [&](double speed, int ticks)
     {
-      input.wirePosition += speed / 2000.0;
-      sum += intervention.Step(input).proximalForce / ticks;
-    }
-    return sum;
-  };
-  const double pushed = meanForce(20.0, 5000);
-  const double pulled = meanForce(-20.0, 2000);
-  EXPECT_GT(pushed, 0.002);
-  EXPECT_LT(pulled, -0.002);
+      double sum = 0.0;
+      for (int k = 0; k < ticks; ++k)
+      {
+        input.wirePosition += speed / 2000.0;
+        sum += intervention.Step(input).proximalForce / ticks;
+      }
+      return sum;
+    };
+    meanForce(20.0, 4000);
+    pushed[rubs] = meanForce(20.0, 1000);
+    meanForce(-20.0, 200); // friction turns round
+    pulled[rubs] = meanForce(-20.0, 1000);
+  }
+  EXPECT_GT(pushed[0], 0.02);
+  EXPECT_LT(pulled[0], -0.02);
+  EXPECT_GT(pushed[1], 1.5 * pushed[0]); // exp(0.08 * 5), and more by the wire's stiffness
+  EXPECT_LT(pulled[1], 1.5 * pulled[0]);
 }
 
 // Recorded hands: where they bring the wire, and that it stays in the lumen on the way.

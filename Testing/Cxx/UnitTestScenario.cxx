@@ -208,7 +208,7 @@ TEST(UnitTestScenario, RefusesWrongImagingAndContrast)
   Refused([](json& s) { s["imaging"]["frame_rate_hz"] = 13; }, "none of 7.5, 15, 30");
   Refused([](json& s) { s["imaging"]["cine_rate_hz"] = 60; }, "none of 7.5, 15, 30");
   Refused([](json& s) { s["imaging"]["isocentre_mm"] = { 1, 2 }; }, "three coordinates");
-  Refused([](json& s) { s["imaging"]["primary_rad"] = 2.0; }, "'primary_rad'");
+  Refused([](json& s) { s["imaging"]["primary_rad"] = 2.2; }, "'primary_rad'");
   Refused(
     [](json& s)
     {

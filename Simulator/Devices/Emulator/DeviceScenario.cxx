@@ -12,20 +12,8 @@ namespace coronary
 {
 namespace
 {
-constexpr double Degree = M_PI / 180.0;
 constexpr std::size_t MostEntries = 100000;
 constexpr double Furthest = 1e6;
-
-struct ChangeMember
-{
-  const char* name;
-  AxisKind kind;
-  double unit;
-};
-constexpr ChangeMember Changes[] = { { "wire_mm", AxisKind::WireAdvance, 1.0 },
-  { "wire_deg", AxisKind::WireTurn, Degree }, { "catheter_mm", AxisKind::CatheterAdvance, 1.0 },
-  { "catheter_deg", AxisKind::CatheterTurn, Degree }, { "syringe_mL", AxisKind::Syringe, 1.0 },
-  { "primary_deg", AxisKind::Primary, Degree }, { "secondary_deg", AxisKind::Secondary, Degree } };
 
 struct PedalName
 {
@@ -81,10 +69,14 @@ HandPiece PieceOf(const nlohmann::json& entry, const std::string& where)
   JsonFields fields(entry, where);
   HandPiece piece;
   piece.seconds = fields.Number("seconds", 0.0, 36000.0);
-  for (const ChangeMember& member : Changes)
+  for (const HandAxis& axis : HandAxisTable)
   {
-    piece.change[static_cast<std::size_t>(member.kind)] =
-      member.unit * fields.Number(member.name, -Furthest, Furthest, 0.0);
+    if (axis.kind <= AxisKind::Secondary) // what the emulated device has
+    {
+      const char* name = axis.kind == AxisKind::Syringe ? "syringe_mL" : axis.scripted;
+      piece.change[static_cast<std::size_t>(axis.kind)] =
+        axis.scriptUnit * fields.Number(name, -Furthest, Furthest, 0.0);
+    }
   }
   piece.pedals = PedalsOf(fields);
   fields.Done();
