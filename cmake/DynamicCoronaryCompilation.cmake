@@ -16,6 +16,10 @@ add_library(dynamiccoronary_options INTERFACE)
 target_compile_options(dynamiccoronary_options INTERFACE -Wall -Wextra -Wshadow)
 if(DYNAMICCORONARY_WARNINGS_AS_ERRORS)
   target_compile_options(dynamiccoronary_options INTERFACE -Werror)
+  # GCC from 13 on warns of bounds within Eigen's and the standard library's own code, of places that are never reached.
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 13)
+    target_compile_options(dynamiccoronary_options INTERFACE -Wno-array-bounds -Wno-stringop-overflow)
+  endif()
 endif()
 
 if(DYNAMICCORONARY_SANITIZE)

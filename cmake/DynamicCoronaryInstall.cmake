@@ -29,6 +29,7 @@ write_basic_package_version_file(
   "${CMAKE_BINARY_DIR}/${package_destination}/dynamiccoronary-config-version.cmake"
   COMPATIBILITY SameMajorVersion)
 install(FILES
+  "${CMAKE_CURRENT_LIST_DIR}/DynamicCoronaryPythonModules.cmake"
   "${CMAKE_BINARY_DIR}/${package_destination}/dynamiccoronary-config.cmake"
   "${CMAKE_BINARY_DIR}/${package_destination}/dynamiccoronary-config-version.cmake"
   DESTINATION "${package_destination}")

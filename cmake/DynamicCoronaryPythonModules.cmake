@@ -1,12 +1,12 @@
-# dynamiccoronary_allow_renamed_python_modules()
+# dynamiccoronary_allow_renamed_python_modules([folder of a VTK's CMake package ...])
 #   Since 13 Debian renames the Python modules of ParaView and VTK after the CMake files that name them were made, and CMake
 #   then stops every project that looks for either, as it checks that the files are there. Modules that are not there are
 #   left unchecked, by the way that CMake 3.28 has for frameworks: nothing links them.
 function(dynamiccoronary_allow_renamed_python_modules)
   file(GLOB folders
-    "${ParaView_DIR}" "${VTK_DIR}" "/usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/paraview-*")
+    ${ARGN} "${ParaView_DIR}" "${VTK_DIR}" "/usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/paraview-*")
   foreach(folder IN LISTS folders)
-    string(REGEX REPLACE "/lib/[^/]+/cmake/[^/]+/*$" "" prefix "${folder}")
+    string(REGEX REPLACE "/lib/[^/]+/cmake/.*$" "" prefix "${folder}")
     file(GLOB lists "${folder}/*Python*-targets-*.cmake" "${folder}/vtk/*Python*-targets-*.cmake")
     foreach(list IN LISTS lists)
       file(STRINGS "${list}" lines REGEX "_cmake_import_check_files_for_")

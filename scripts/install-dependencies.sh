@@ -66,7 +66,7 @@ common=(
 )
 paraview=(paraview-dev python3-paraview libopenmpi-dev libdouble-conversion-dev "${qt[@]}")
 # For tests; without those after the first some are skipped.
-tests=(libgtest-dev "${browser[@]}" curl ca-certificates plastimatch python3-nbconvert python3-ipykernel python3-matplotlib)
+tests=(libgtest-dev libxtst6 "${browser[@]}" curl ca-certificates plastimatch python3-nbconvert python3-ipykernel python3-matplotlib)
 nightly=(libbenchmark-dev libinsighttoolkit5-dev elastix)
 developer=("${clang[@]}" valgrind heaptrack shellcheck)
 

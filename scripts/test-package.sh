@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Installs the package in a Debian 12 that was just made and has nothing else, and uses it: ParaView must load the
+# Installs the package in a Debian that was just made and has nothing else, and uses it: ParaView must load the
 # plugin by itself, the programs must run; removed, it must leave nothing behind. Needs root and debootstrap.
 set -euo pipefail
 
-if [ $# -lt 1 ] || [ $# -gt 2 ] || [ ! -f "$1" ]; then
-  echo "Usage: scripts/test-package.sh PACKAGE.deb [FOLDER]   (FOLDER, where the system is made: default mktemp -d)" >&2
+if [ $# -lt 1 ] || [ $# -gt 3 ] || [ ! -f "$1" ] || ! [[ ${2:-bookworm} =~ ^(bookworm|trixie|sid)$ ]]; then
+  echo "Usage: scripts/test-package.sh PACKAGE.deb [bookworm|trixie|sid [FOLDER]]   (FOLDER, where the system is made: default mktemp -d)" >&2
   exit 2
 fi
 if [ "$(id -u)" -ne 0 ] || ! command -v debootstrap >/dev/null; then
@@ -12,16 +12,21 @@ if [ "$(id -u)" -ne 0 ] || ! command -v debootstrap >/dev/null; then
   exit 1
 fi
 package="$(realpath "$1")"
-system="$(realpath "${2:-$(mktemp -d)}")"
-mirror="${DEBIAN_MIRROR:-http://deb.debian.org/debian}"
+suite="${2:-bookworm}"
+system="$(realpath "${3:-$(mktemp -d)}")"
+mirror="${DYNAMICCORONARY_MIRROR:-http://deb.debian.org/debian}"
+icons=qt6-svg-plugins
+if [ "$suite" = bookworm ]; then
+  icons=libqt5svg5
+fi
 
 # Its mounts are seen by this process and its children only.
 if [ -z "${DYNAMICCORONARY_OWN_MOUNTS:-}" ]; then
-  DYNAMICCORONARY_OWN_MOUNTS=yes exec unshare --mount -- "$0" "$package" "$system"
+  DYNAMICCORONARY_OWN_MOUNTS=yes exec unshare --mount -- "$0" "$package" "$suite" "$system"
 fi
 if [ ! -e "$system/usr/bin/dpkg" ]; then
-  echo "== A new Debian 12 in $system"
-  debootstrap --variant=minbase --include=ca-certificates bookworm "$system" "$mirror" >"$system.log" 2>&1
+  echo "== A new $suite in $system"
+  debootstrap --variant=minbase --include=ca-certificates "$suite" "$system" "$mirror" >"$system.log" 2>&1
 fi
 cp /etc/resolv.conf "$system/etc/resolv.conf"
 cp "$package" "$system/root/package.deb"
@@ -32,7 +37,7 @@ cat >"$system/root/use.sh" <<'EOF'
 set -eu
 export DEBIAN_FRONTEND=noninteractive HOME=/root
 apt-get -qq update
-apt-get -qq -y --no-install-recommends install /root/package.deb python3-paraview libqt5svg5 xvfb xauth >/root/apt.log 2>&1 ||
+apt-get -qq -y --no-install-recommends install /root/package.deb python3-paraview "$1" xvfb xauth >/root/apt.log 2>&1 ||
   { tail -n 20 /root/apt.log; exit 1; }
 echo "== Installed: $(dpkg-query -W -f '${Package} ${Version}' dynamiccoronary)"
 cat /usr/bin/paraview.conf
@@ -74,4 +79,4 @@ if [ -e /usr/bin/paraview.conf ] || find / -xdev -path /proc -prune -o -iname '*
 fi
 echo "== Removed without a trace"
 EOF
-chroot "$system" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 bash /root/use.sh
+chroot "$system" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 bash /root/use.sh "$icons"

@@ -101,8 +101,13 @@ void AddRepair(std::vector<SweepRepair>& repairs, std::vector<std::string>& rema
   const VesselTree& tree, int groupId, const std::string& what, const Vector3& place)
 {
   const std::string vessel = VesselName(tree, groupId);
-  repairs.push_back({ groupId, vessel, what, place });
-  remarks.push_back(vessel + " at " + SweepPlace(place) + ": " + what);
+  const std::string remark = vessel + " at " + SweepPlace(place) + ": " + what;
+  // An end is looked at once more after what changed beside it.
+  if (std::find(remarks.begin(), remarks.end(), remark) == remarks.end())
+  {
+    repairs.push_back({ groupId, vessel, what, place });
+    remarks.push_back(remark);
+  }
 }
 
 void AddLeftOut(std::vector<SweepLeftOut>& leftOut, std::vector<std::string>& remarks,

@@ -54,7 +54,7 @@ def phantom(size=None):
     for view in (front, axial):
         image = views.show_slice(cut, view, "HU", *HOUNSFIELD)
     image.SetScalarBarVisibility(axial, True)
-    views.legend(axial, "HU", "CT (HU)", "%-#.0f")
+    views.legend(axial, "HU", "CT (HU)", 0)
     ring = simple.Show(rim, axial, "GeometryRepresentation")
     views.plain(ring, views.WALL)
     ring.LineWidth = 2.5

@@ -105,7 +105,7 @@ def colour_by(shown, view, array, title, low, high, preset="Plasma (matplotlib)"
     transfer.RescaleTransferFunction(low, high)
     transfer.AutomaticRescaleRangeMode = "Never"
     shown.SetScalarBarVisibility(view, True)
-    return legend(view, array, title, "%-#.2f" if high < 5.0 else "%-#.1f")
+    return legend(view, array, title, 2 if high < 5.0 else 1)
 
 
 def ink(view):
@@ -113,14 +113,17 @@ def ink(view):
     return WHITE if list(view.Background) == BLACK else BLACK
 
 
-def legend(view, array, title, form):
-    """The bar of an array's colours, below in a view; `form` as of printf."""
+def legend(view, array, title, digits):
+    """The bar of an array's colours, below in a view; numbers with so many digits behind the point."""
     bar = simple.GetScalarBar(simple.GetColorTransferFunction(array), view)
     bar.Title = title
     bar.ComponentTitle = ""
     bar.TitleColor = bar.LabelColor = ink(view)
     bar.AutomaticLabelFormat = 0
-    bar.LabelFormat = bar.RangeLabelFormat = form
+    # From 6.1 on as of C++'s std::format, before as of printf.
+    version = simple.GetParaViewVersion()
+    form = "{:<#.%df}" if (version.major, version.minor) >= (6, 1) else "%%-#.%df"
+    bar.LabelFormat = bar.RangeLabelFormat = form % digits
     bar.Orientation = "Horizontal"
     bar.WindowLocation = "Lower Center"
     bar.ScalarBarLength = 0.5

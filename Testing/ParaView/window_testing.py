@@ -49,8 +49,9 @@ def near(a, b, tolerance):
 def live(seconds, until=lambda: False):
     """Lets the window live, which it does not while the Python shell works; the longest turn, s, and how many there were."""
     # QCoreApplication::processEvents(flags, milliseconds); with Python's lock, which what is called there takes for granted.
-    turn = getattr(ctypes.PyDLL("libQt5Core.so.5"),
-                   "_ZN16QCoreApplication13processEventsE6QFlagsIN10QEventLoop17ProcessEventsFlagEEi")
+    with open("/proc/self/maps", encoding="utf-8") as maps:
+        core = "libQt6Core.so.6" if "libQt6Core" in maps.read() else "libQt5Core.so.5"
+    turn = getattr(ctypes.PyDLL(core), "_ZN16QCoreApplication13processEventsE6QFlagsIN10QEventLoop17ProcessEventsFlagEEi")
     end, longest, turns = time.monotonic() + seconds, 0.0, 0
     while time.monotonic() < end and not until():
         start = time.monotonic()
