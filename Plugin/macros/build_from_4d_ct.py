@@ -127,7 +127,7 @@ def build(source=None, *, time=None, scales=(0.5, 2.5), c=100.0, seed=(), larges
             PosedSkeleton=poses, DoublePrecision=1))
         wall = moved
     boundary = add("boundary", simple.ExtractSurface(wall, registrationName="13 Boundary"))
-    add("wall", simple.GenerateSurfaceNormals(boundary, registrationName="14 Wall", FeatureAngle=60.0))
+    add("wall", views.smooth(boundary, "14 Wall"))
     if show:
         made["layout"], made["views"] = show_model(made, times, size)
         for _ in made["frames"]:
@@ -248,7 +248,7 @@ def open_result(folder, series, size=None):
     source = series
     if isinstance(series, str):
         source = simple.GatedImageReader(registrationName="Images", FileNames=[series])
-    wall = simple.GenerateSurfaceNormals(moved, registrationName="Wall", FeatureAngle=60.0)
+    wall = views.smooth(moved, "Wall")
     made = {"source": source, "reference": source, "tree": tree, "lines": lines, "moved": moved, "wall": wall}
     for proxy in (views.proxy_of(source), tree, lines, wall):
         proxy.UpdatePipeline()

@@ -100,7 +100,7 @@ def bound_mesh():
 def wall_of(mesh):
     """The boundary of tetrahedra with smooth shading."""
     boundary = simple.ExtractSurface(mesh, registrationName="Boundary")
-    return simple.GenerateSurfaceNormals(boundary, registrationName="Wall", FeatureAngle=60.0)
+    return views.smooth(boundary, "Wall")
 
 
 def posing(size=None):

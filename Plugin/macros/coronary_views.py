@@ -97,15 +97,28 @@ def plain(shown, colour, opacity=1.0):
     shown.Opacity = opacity
 
 
+def is_paraview(major, minor):
+    """Whether it is this version or a later one."""
+    version = simple.GetParaViewVersion()
+    return (version.major, version.minor) >= (major, minor)
+
+
 def colour_by(shown, view, array, title, low, high, preset="Plasma (matplotlib)", where="POINTS"):
     """Colours of a point array from `low` to `high`, with a legend below."""
     simple.ColorBy(shown, (where, array))
     transfer = simple.GetColorTransferFunction(array)
-    transfer.ApplyPreset(preset, True)
+    # ParaView 6 calls matplotlib's by their own names.
+    transfer.ApplyPreset(preset.split(" (")[0] if is_paraview(6, 0) else preset, True)
     transfer.RescaleTransferFunction(low, high)
     transfer.AutomaticRescaleRangeMode = "Never"
     shown.SetScalarBarVisibility(view, True)
     return legend(view, array, title, 2 if high < 5.0 else 1)
+
+
+def smooth(surface, name):
+    """A surface with normals for smooth shading; sharp edges stay."""
+    normals = simple.SurfaceNormals if is_paraview(6, 0) else simple.GenerateSurfaceNormals
+    return normals(surface, registrationName=name, FeatureAngle=60.0)
 
 
 def ink(view):
@@ -121,8 +134,7 @@ def legend(view, array, title, digits):
     bar.TitleColor = bar.LabelColor = ink(view)
     bar.AutomaticLabelFormat = 0
     # From 6.1 on as of C++'s std::format, before as of printf.
-    version = simple.GetParaViewVersion()
-    form = "{:<#.%df}" if (version.major, version.minor) >= (6, 1) else "%%-#.%df"
+    form = "{:.%df}" if is_paraview(6, 1) else "%%-.%df"
     bar.LabelFormat = bar.RangeLabelFormat = form % digits
     bar.Orientation = "Horizontal"
     bar.WindowLocation = "Lower Center"

@@ -13,7 +13,8 @@ from paraview import make_name_valid, servermanager, simple
 
 from coronary_testing import load_plugin
 
-plugin, folder, resources, help_file = sys.argv[1:5]
+plugin, folder, resources = sys.argv[1:4]
+help_file = sys.argv[4] if len(sys.argv) > 4 else ""
 complaints = []
 MENU_GROUPS = ("sources", "filters", "writers")
 # What the help of a number has to have a word of: its unit, or what it is a number of.
