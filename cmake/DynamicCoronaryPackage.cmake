@@ -20,17 +20,23 @@ set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
 # Libraries that the programs load; what they load among themselves lies in the build tree.
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS "${CMAKE_LIBRARY_OUTPUT_DIRECTORY}")
-set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA "${CMAKE_CURRENT_LIST_DIR}/debian/triggers")
+set(triggers "activate-noawait ldconfig\n")
+set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA "${CMAKE_BINARY_DIR}/debian/triggers")
 if(DYNAMICCORONARY_WITH_PARAVIEW)
   set(CPACK_DEBIAN_PACKAGE_DEPENDS "paraview")
   # Icons; pvpython; a display for pictures without a screen.
   set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "libqt5svg5 | qt6-svg-plugins, python3-paraview, xvfb, xauth")
   set(plugin_list "/usr/${CMAKE_INSTALL_LIBDIR}/${PARAVIEW_PLUGIN_SUBDIR}/dynamiccoronary.plugins.xml")
+  # Beside ParaView's own plugins.
+  string(REGEX REPLACE "/cmake/[^/]+/*$" "" paraview_conf "${ParaView_DIR}")
+  string(REGEX REPLACE "/plugins$" "/paraview.conf" paraview_conf "${paraview_conf}/${PARAVIEW_PLUGIN_SUBDIR}")
+  string(APPEND triggers "interest-noawait ${paraview_conf}\n")
   configure_file("${CMAKE_CURRENT_LIST_DIR}/debian/postinst.in" "${CMAKE_BINARY_DIR}/debian/postinst" @ONLY)
   configure_file("${CMAKE_CURRENT_LIST_DIR}/debian/prerm.in" "${CMAKE_BINARY_DIR}/debian/prerm" @ONLY)
   list(APPEND CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA
     "${CMAKE_BINARY_DIR}/debian/postinst" "${CMAKE_BINARY_DIR}/debian/prerm")
 endif()
+file(WRITE "${CMAKE_BINARY_DIR}/debian/triggers" "${triggers}")
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 
 install(FILES "${CMAKE_SOURCE_DIR}/LICENSE"

@@ -40,7 +40,7 @@ apt-get -qq update
 apt-get -qq -y --no-install-recommends install /root/package.deb python3-paraview "$1" xvfb xauth >/root/apt.log 2>&1 ||
   { tail -n 20 /root/apt.log; exit 1; }
 echo "== Installed: $(dpkg-query -W -f '${Package} ${Version}' dynamiccoronary)"
-cat /usr/bin/paraview.conf
+cat /usr/bin/paraview.conf /usr/lib/*/paraview-*/paraview.conf 2>/dev/null || true
 display() { xvfb-run -a -s "-screen 0 1280x900x24 -noreset" "$@"; }
 
 cd /root
@@ -73,7 +73,7 @@ echo "paraview: plugin $(cat /root/window.txt)"
 [ "$(cat /root/window.txt)" = loaded ]
 
 apt-get -qq -y remove dynamiccoronary >/root/apt.log 2>&1 || { tail -n 20 /root/apt.log; exit 1; }
-if [ -e /usr/bin/paraview.conf ] || find / -xdev -path /proc -prune -o -iname '*coronary*' -not -path '/root/*' -not -path '/var/*' -print | grep .; then
+if [ -e /usr/bin/paraview.conf ] || grep -i coronary /usr/lib/*/paraview-*/paraview.conf 2>/dev/null || find / -xdev -path /proc -prune -o -iname '*coronary*' -not -path '/root/*' -not -path '/var/*' -print | grep .; then
   echo "test-package: the files above stayed behind" >&2
   exit 1
 fi
