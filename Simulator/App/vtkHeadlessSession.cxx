@@ -514,9 +514,7 @@ void RunHeadless(const HeadlessOptions& options)
     options.script.empty() ? DriveScript() : ReadDriveScript(options.script);
   auto recorded = options.replay.empty() ? nullptr : std::make_unique<ReplaySource>(options.replay);
   const RecordingReader* replay = recorded ? &recorded->Reader() : nullptr;
-  const auto expected = options.ticks > 0 || recorded
-    ? options.ticks
-    : static_cast<std::uint64_t>(std::ceil(script.Duration() * rate));
+  const auto expected = options.ticks > 0 || recorded ? options.ticks : script.Ticks(rate);
   if (expected == 0 && !recorded)
   {
     throw UsageError(

@@ -89,6 +89,11 @@ DriveScript::DriveScript(std::vector<DrivePiece> pieces)
   this->Total = start.time;
 }
 
+std::uint64_t DriveScript::Ticks(double tickRate) const
+{
+  return static_cast<std::uint64_t>(std::ceil(this->Total * tickRate));
+}
+
 SessionInput DriveScript::At(double seconds, const SessionInput& start) const
 {
   const auto after = std::upper_bound(this->Starts.begin(), this->Starts.end(), seconds,

@@ -7,6 +7,7 @@
 
 #include "HandAxes.h"
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,7 @@ public:
   explicit DriveScript(std::vector<DrivePiece> pieces);
 
   double Duration() const { return this->Total; } ///< s
+  std::uint64_t Ticks(double tickRate) const;     ///< after which it is over
 
   /// Where hands, feet and C-arm are, `seconds` after the start; after the end they rest, off the pedals.
   /// @param start  where they are before

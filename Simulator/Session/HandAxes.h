@@ -59,7 +59,6 @@ struct HandAxis
   DeviceAxes group;
   double low; ///< where it can be
   double high;
-  double start;
   double tremble;       ///< that a hand at rest moves an encoder
   double fastest;       ///< a second: no hand is faster
   double speed;         ///< a second, of a key or a stick at its end
@@ -77,28 +76,28 @@ constexpr double Anywhere = 1e300;
 constexpr std::size_t HandAxes = 11;
 
 constexpr std::array<HandAxis, HandAxes> HandAxisTable{ {
-  { AxisKind::WireAdvance, AxisUnit::Millimetre, WireAxes, -Anywhere, Anywhere, 0.0, 0.2, 2000.0,
-    10.0, true, "wire_position", "wire_mm", 1.0, 1e6, "up", "down" },
-  { AxisKind::WireTurn, AxisUnit::Radian, WireAxes, -Anywhere, Anywhere, 0.0, 0.02, 60.0, 3.14,
-    true, "wire_angle", "wire_deg", DegreeOfHands, 1e7, "right", "left" },
-  { AxisKind::CatheterAdvance, AxisUnit::Millimetre, CatheterAxes, -Anywhere, Anywhere, 0.0, 0.2,
-    2000.0, 5.0, true, "catheter_position", "catheter_mm", 1.0, 1e6, "w", "s" },
-  { AxisKind::CatheterTurn, AxisUnit::Radian, CatheterAxes, -Anywhere, Anywhere, 0.0, 0.02, 60.0,
-    1.0, true, "catheter_angle", "catheter_deg", DegreeOfHands, 1e7, "d", "a" },
-  { AxisKind::Syringe, AxisUnit::Millilitre, SyringeAxis, -Anywhere, Anywhere, 0.0, 0.05, 100.0,
-    3.0, false, "syringe", "inject_mL", 1.0, 1000.0, "space", "backspace" },
+  { AxisKind::WireAdvance, AxisUnit::Millimetre, WireAxes, -Anywhere, Anywhere, 0.2, 2000.0, 10.0,
+    true, "wire_position", "wire_mm", 1.0, 1e6, "up", "down" },
+  { AxisKind::WireTurn, AxisUnit::Radian, WireAxes, -Anywhere, Anywhere, 0.02, 60.0, 3.14, true,
+    "wire_angle", "wire_deg", DegreeOfHands, 1e7, "right", "left" },
+  { AxisKind::CatheterAdvance, AxisUnit::Millimetre, CatheterAxes, -Anywhere, Anywhere, 0.2, 2000.0,
+    5.0, true, "catheter_position", "catheter_mm", 1.0, 1e6, "w", "s" },
+  { AxisKind::CatheterTurn, AxisUnit::Radian, CatheterAxes, -Anywhere, Anywhere, 0.02, 60.0, 1.0,
+    true, "catheter_angle", "catheter_deg", DegreeOfHands, 1e7, "d", "a" },
+  { AxisKind::Syringe, AxisUnit::Millilitre, SyringeAxis, -Anywhere, Anywhere, 0.05, 100.0, 3.0,
+    false, "syringe", "inject_mL", 1.0, 1000.0, "space", "backspace" },
   { AxisKind::Primary, AxisUnit::Radian, ViewAxes, -120.0 * DegreeOfHands, 120.0 * DegreeOfHands,
-    0.0, 0.005, 60.0, 0.35, false, "primary", "primary_deg", DegreeOfHands, 360.0, "l", "j" },
+    0.005, 60.0, 0.35, false, "primary", "primary_deg", DegreeOfHands, 360.0, "l", "j" },
   { AxisKind::Secondary, AxisUnit::Radian, ViewAxes, -55.0 * DegreeOfHands, 55.0 * DegreeOfHands,
-    0.0, 0.005, 60.0, 0.35, false, "secondary", "secondary_deg", DegreeOfHands, 360.0, "i", "k" },
-  { AxisKind::SourceToDetector, AxisUnit::Millimetre, ViewAxes, 900.0, 1300.0, 1100.0, 1.0, 2000.0,
-    50.0, false, "source_to_detector", "source_to_detector_mm", 1.0, 1000.0, "o", "u" },
-  { AxisKind::TableLeft, AxisUnit::Millimetre, ViewAxes, -200.0, 200.0, 0.0, 1.0, 2000.0, 40.0,
-    false, "table_x", "table_x_mm", 1.0, 1000.0, "h", "z" },
-  { AxisKind::TableBack, AxisUnit::Millimetre, ViewAxes, -200.0, 200.0, 0.0, 1.0, 2000.0, 40.0,
-    false, "table_y", "table_y_mm", 1.0, 1000.0, "next", "prior" },
-  { AxisKind::TableHead, AxisUnit::Millimetre, ViewAxes, -200.0, 200.0, 0.0, 1.0, 2000.0, 40.0,
-    false, "table_z", "table_z_mm", 1.0, 1000.0, "t", "g" },
+    0.005, 60.0, 0.35, false, "secondary", "secondary_deg", DegreeOfHands, 360.0, "i", "k" },
+  { AxisKind::SourceToDetector, AxisUnit::Millimetre, ViewAxes, 900.0, 1300.0, 1.0, 2000.0, 50.0,
+    false, "source_to_detector", "source_to_detector_mm", 1.0, 1000.0, "o", "u" },
+  { AxisKind::TableLeft, AxisUnit::Millimetre, ViewAxes, -200.0, 200.0, 1.0, 2000.0, 40.0, false,
+    "table_x", "table_x_mm", 1.0, 1000.0, "h", "z" },
+  { AxisKind::TableBack, AxisUnit::Millimetre, ViewAxes, -200.0, 200.0, 1.0, 2000.0, 40.0, false,
+    "table_y", "table_y_mm", 1.0, 1000.0, "next", "prior" },
+  { AxisKind::TableHead, AxisUnit::Millimetre, ViewAxes, -200.0, 200.0, 1.0, 2000.0, 40.0, false,
+    "table_z", "table_z_mm", 1.0, 1000.0, "t", "g" },
 } };
 
 /// A place, a speed or a wish for each axis.

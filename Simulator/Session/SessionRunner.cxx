@@ -33,11 +33,6 @@ ScriptSource::ScriptSource(
 {
 }
 
-std::uint64_t ScriptSource::Ticks() const
-{
-  return static_cast<std::uint64_t>(std::ceil(this->Script.Duration() * this->Rate));
-}
-
 bool ScriptSource::At(std::uint64_t tick, SessionInput& input, std::vector<RecordedEvent>& events)
 {
   // The place at the end of the step, so that a piece is over when its ticks are.
@@ -48,7 +43,7 @@ bool ScriptSource::At(std::uint64_t tick, SessionInput& input, std::vector<Recor
   {
     events.push_back({ RecordedEvent::HeartRate, heartRate });
   }
-  return this->Endless || tick < this->Ticks();
+  return this->Endless || tick < this->Script.Ticks(this->Rate);
 }
 
 SessionRunner::SessionRunner(std::shared_ptr<WallMotion> wall, const Scenario& scenario,

@@ -63,7 +63,6 @@ public:
   /// @param start  before the first piece  @param endless  the hands rest when the script is over, and time goes on
   ScriptSource(DriveScript script, const SessionInput& start, double tickRate, bool endless);
 
-  std::uint64_t Ticks() const; ///< of the script
   bool At(std::uint64_t tick, SessionInput& input, std::vector<RecordedEvent>& events) override;
 
 private:
@@ -122,7 +121,7 @@ public:
   std::uint64_t UnknownEvents() const { return this->Unknown; }
 
 private:
-  static constexpr std::size_t EventKinds = 4;
+  static constexpr std::size_t EventKinds = RecordedEvent::FieldOfView + 1; // the last kind
 
   bool Step();
   void TakePosted();
