@@ -6,7 +6,7 @@ from paraview import simple
 
 sys.path.insert(0, os.environ["DYNAMICCORONARY_TEST_SCRIPTS"])
 from coronary_testing import CENTERLINES, require
-from window_testing import FOLDER, checker, live, photograph, picture
+from window_testing import FOLDER, checker, photograph, picture
 
 seen = {}
 
@@ -38,7 +38,6 @@ def views_of(kind):
 
 
 def look(step):
-    live(1.0)
     if step == "looked":
         cycle = simple.FindSource("Over the cycle")
         require(cycle is not None, "there is no Over the cycle")
