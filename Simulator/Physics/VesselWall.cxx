@@ -20,93 +20,53 @@ WallHit VesselWall::Internals::ClosestTo(const Vector3& p, std::int32_t patch, s
   {
     this->MarkAround(patch);
   }
-  const auto allowed = [&](std::int32_t triangle) { return patch < 0 || this->IsMarked(triangle); };
-  const Vector3 relative = p - this->Centre;
+  const Vector3 relative = p - this->Tree.Centre();
   const float padding = this->Padding(relative);
   WallHit best;
   double bestSquared = Infinity;
-  float limit = std::numeric_limits<float>::infinity(); ///< squared, padded
+  float limit = std::numeric_limits<float>::max(); ///< squared, padded
   const auto offer = [&](std::int32_t triangle)
   {
-    const WallTrianglePoint on = this->Nearest(triangle, p);
-    if (on.squared < bestSquared || (on.squared == bestSquared && triangle < best.triangle))
+    if (patch >= 0 && !this->IsMarked(triangle))
+    {
+      return;
+    }
+    const TrianglePoint on = this->Nearest(triangle, p);
+    if (on.squaredDistance < bestSquared ||
+      (on.squaredDistance == bestSquared && triangle < best.triangle))
     {
       best.triangle = triangle;
       best.on = on;
-      bestSquared = on.squared;
-      const float reach = static_cast<float>(std::sqrt(on.squared)) * 1.000001f + padding;
+      bestSquared = on.squaredDistance;
+      const float reach = static_cast<float>(std::sqrt(on.squaredDistance)) * 1.000001f + padding;
       limit = reach * reach;
     }
   };
-  if (hint >= 0 && allowed(hint))
+  if (hint >= 0)
   {
     offer(hint);
   }
-  struct Entry
-  {
-    float squared;
-    std::int32_t level;
-    std::int64_t node;
-  };
-  std::array<Entry, 8 * 16> stack;
-  int size = 0;
-  const float at[3] = { static_cast<float>(relative[0]), static_cast<float>(relative[1]),
-    static_cast<float>(relative[2]) };
+  const Eigen::Array3f at = relative.cast<float>();
   const auto f = static_cast<float>(this->Fraction);
-  const int now = this->Now;
-  const int next = 1 - now;
-  const auto top = static_cast<std::int32_t>(this->LevelBegin.size()) - 1;
-  const auto count = static_cast<std::int64_t>(this->Triangles.size());
-  stack[size++] = { 0.0f, top, 0 };
-  while (size > 0)
-  {
-    const Entry entry = stack[--size];
-    if (entry.squared > limit)
+  this->Tree.ForEach<true>(
+    limit,
+    [&](std::int32_t node, float* squared)
     {
-      continue;
-    }
-    if (entry.level < 0)
-    {
-      const std::int64_t end = std::min(count, WallLeafSize * (entry.node + 1));
-      for (std::int64_t t = WallLeafSize * entry.node; t < end; ++t)
+      const BoxNode& now = this->BoxesNow[node];
+      const BoxNode& next = this->BoxesNext[node];
+      for (int k = 0; k < 3; ++k)
       {
-        if (allowed(static_cast<std::int32_t>(t)))
+        for (int lane = 0; lane < BoxNode::Width; ++lane)
         {
-          offer(static_cast<std::int32_t>(t));
+          const float low = now.low[k][lane] + f * (next.low[k][lane] - now.low[k][lane]) - at[k];
+          const float high =
+            at[k] - now.high[k][lane] - f * (next.high[k][lane] - now.high[k][lane]);
+          const float out = std::max(0.0f, std::max(low, high));
+          squared[lane] += out * out;
         }
       }
-      continue;
-    }
-    const WallNode& node = this->Nodes[this->LevelBegin[entry.level] + entry.node];
-    float squared[WallBoxWidth] = {};
-    for (int k = 0; k < 3; ++k)
-    {
-      for (int lane = 0; lane < WallBoxWidth; ++lane)
-      {
-        const float low =
-          node.low[now][k][lane] + f * (node.low[next][k][lane] - node.low[now][k][lane]) - at[k];
-        const float high = at[k] - node.high[now][k][lane] -
-          f * (node.high[next][k][lane] - node.high[now][k][lane]);
-        const float out = std::max(0.0f, std::max(low, high));
-        squared[lane] += out * out;
-      }
-    }
-    // Nearest last, so that it is looked at first.
-    const int first = size;
-    for (int lane = 0; lane < WallBoxWidth; ++lane)
-    {
-      if (squared[lane] > limit || squared[lane] > 1e29f)
-      {
-        continue;
-      }
-      int i = size++;
-      for (; i > first && stack[i - 1].squared < squared[lane]; --i)
-      {
-        stack[i] = stack[i - 1];
-      }
-      stack[i] = { squared[lane], entry.level - 1, WallBoxWidth * entry.node + lane };
-    }
-  }
+    },
+    offer);
   best.distance = std::sqrt(bestSquared);
   return best;
 }
@@ -115,126 +75,63 @@ template <typename Visit>
 void VesselWall::Internals::ForEachNear(
   const Vector3& p, const Vector3& velocity, double window, double radius, const Visit& visit) const
 {
-  const Vector3 begin = p - this->Centre;
+  const Vector3 begin = p - this->Tree.Centre();
   const Vector3 end = begin + window * velocity;
   const float reach =
     static_cast<float>(radius) * 1.000001f + std::max(this->Padding(begin), this->Padding(end));
   const float limit = reach * reach;
-  const float at[3] = { static_cast<float>(begin[0]), static_cast<float>(begin[1]),
-    static_cast<float>(begin[2]) };
-  const float to[3] = { static_cast<float>(end[0]), static_cast<float>(end[1]),
-    static_cast<float>(end[2]) };
+  const Eigen::Array3f at = begin.cast<float>();
+  const Eigen::Array3f to = end.cast<float>();
   const auto f = static_cast<float>(this->Fraction);
   const auto g = static_cast<float>((this->Time + window) / this->Seconds);
   // Beyond the next key frame, the far side of the box now is what counts against.
   const float past = 1.0f - g;
-  const int now = this->Now;
-  const int next = 1 - now;
-  std::array<std::pair<std::int32_t, std::int64_t>, 8 * 16> stack;
-  int size = 0;
-  const auto count = static_cast<std::int64_t>(this->Triangles.size());
-  stack[size++] = { static_cast<std::int32_t>(this->LevelBegin.size()) - 1, 0 };
-  while (size > 0)
-  {
-    const auto [level, number] = stack[--size];
-    if (level < 0)
+  this->Tree.ForEach<false>(
+    limit,
+    [&](std::int32_t node, float* squared)
     {
-      const std::int64_t last = std::min(count, WallLeafSize * (number + 1));
-      for (std::int64_t t = WallLeafSize * number; t < last; ++t)
+      const BoxNode& now = this->BoxesNow[node];
+      const BoxNode& next = this->BoxesNext[node];
+      for (int k = 0; k < 3; ++k)
       {
-        visit(static_cast<std::int32_t>(t));
+        const float* low0 = now.low[k];
+        const float* high0 = now.high[k];
+        const float* low1 = next.low[k];
+        const float* high1 = next.high[k];
+        const float* lowPast = past < 0.0f ? high0 : low0;
+        const float* highPast = past < 0.0f ? low0 : high0;
+        for (int lane = 0; lane < BoxNode::Width; ++lane)
+        {
+          const float low = std::min(low0[lane] + f * (low1[lane] - low0[lane]) - at[k],
+            past * lowPast[lane] + g * low1[lane] - to[k]);
+          const float high = std::max(high0[lane] + f * (high1[lane] - high0[lane]) - at[k],
+            past * highPast[lane] + g * high1[lane] - to[k]);
+          const float out = std::max(0.0f, std::max(low, -high));
+          squared[lane] += out * out;
+        }
       }
-      continue;
-    }
-    const WallNode& node = this->Nodes[this->LevelBegin[level] + number];
-    float squared[WallBoxWidth] = {};
-    for (int k = 0; k < 3; ++k)
-    {
-      const float* low0 = node.low[now][k];
-      const float* high0 = node.high[now][k];
-      const float* low1 = node.low[next][k];
-      const float* high1 = node.high[next][k];
-      const float* lowPast = past < 0.0f ? high0 : low0;
-      const float* highPast = past < 0.0f ? low0 : high0;
-      for (int lane = 0; lane < WallBoxWidth; ++lane)
-      {
-        const float low = std::min(low0[lane] + f * (low1[lane] - low0[lane]) - at[k],
-          past * lowPast[lane] + g * low1[lane] - to[k]);
-        const float high = std::max(high0[lane] + f * (high1[lane] - high0[lane]) - at[k],
-          past * highPast[lane] + g * high1[lane] - to[k]);
-        const float out = std::max(0.0f, std::max(low, -high));
-        squared[lane] += out * out;
-      }
-    }
-    for (int lane = 0; lane < WallBoxWidth; ++lane)
-    {
-      if (squared[lane] <= limit && squared[lane] < 1e27f)
-      {
-        stack[size++] = { level - 1, WallBoxWidth * number + lane };
-      }
-    }
-  }
+    },
+    visit);
 }
 
 WallMemory& VesselWall::Internals::Of(std::int64_t index)
 {
-  std::int32_t slot = this->FindSlot(index);
-  if (slot >= 0)
+  const auto [known, isNew] = this->Memories.try_emplace(index);
+  if (isNew)
   {
-    return this->Memories[slot];
+    known->second.index = index;
+    known->second.list.reserve(96);
   }
-  if (this->Unused.empty())
-  {
-    slot = static_cast<std::int32_t>(this->Memories.size());
-    this->Memories.emplace_back();
-    this->Memories.back().list.reserve(96);
-    this->Unused.reserve(this->Memories.capacity());
-  }
-  else
-  {
-    slot = this->Unused.back();
-    this->Unused.pop_back();
-  }
-  this->Memories[slot].Reset(index);
-  ++this->Known;
-  if (4 * this->Known > this->Table.size())
-  {
-    const std::vector<std::int32_t> old = std::move(this->Table);
-    this->Table.assign(2 * old.size(), -1);
-    for (const std::int32_t other : old)
-    {
-      if (other >= 0)
-      {
-        this->Insert(other);
-      }
-    }
-  }
-  this->Insert(slot);
-  return this->Memories[slot];
+  return known->second;
 }
 
-void VesselWall::Internals::Forget(std::int64_t index)
+/// As one that was never seen, but for where it belongs.
+void VesselWall::Internals::Place(std::int64_t index, std::int32_t patch, std::int32_t nearest)
 {
-  const std::size_t mask = this->Table.size() - 1;
-  std::size_t i = Hash(index) & mask;
-  while (this->Table[i] >= 0 && this->Memories[this->Table[i]].index != index)
-  {
-    i = (i + 1) & mask;
-  }
-  if (this->Table[i] < 0)
-  {
-    return;
-  }
-  this->Unused.push_back(this->Table[i]);
-  --this->Known;
-  this->Table[i] = -1;
-  // What comes after the gap may have to move into it.
-  for (std::size_t j = (i + 1) & mask; this->Table[j] >= 0; j = (j + 1) & mask)
-  {
-    const std::int32_t slot = this->Table[j];
-    this->Table[j] = -1;
-    this->Insert(slot);
-  }
+  this->Memories.erase(index);
+  WallMemory& memory = this->Of(index);
+  memory.patch = patch;
+  memory.nearest = nearest;
 }
 
 bool VesselWall::Internals::Valid(const WallMemory& memory, const Vector3& p, double& drift) const
@@ -286,7 +183,7 @@ double VesselWall::Internals::Collect(
       }
       const double speed = std::sqrt(fastest) * (1.0 + 1e-6) + 1e-6;
       const double further = radius + memory.window * speed + 1e-5;
-      const double squared = this->Nearest(triangle, p, further).squared;
+      const double squared = this->Nearest(triangle, p, further).squaredDistance;
       if (squared < further * further)
       {
         const double distance = std::sqrt(squared) * (1.0 - 1e-6) - 1e-6;
@@ -299,7 +196,7 @@ double VesselWall::Internals::Collect(
   return minimum;
 }
 
-void VesselWall::Internals::Know(WallMemory& memory, const Vector3& p, double distance)
+void VesselWall::Internals::RememberDistance(WallMemory& memory, const Vector3& p, double distance)
 {
   memory.known = true;
   memory.knownAt = p;
@@ -307,7 +204,8 @@ void VesselWall::Internals::Know(WallMemory& memory, const Vector3& p, double di
   memory.knownTime = this->FrameBegin + this->Time;
 }
 
-WallSide VesselWall::Internals::Judge(WallMemory& memory, const WallHit& hit, const Vector3& p)
+WallSide VesselWall::Internals::SideSinceSeen(
+  WallMemory& memory, const WallHit& hit, const Vector3& p)
 {
   constexpr double Slack = 0.03; // mm, for what the wall near it moves unevenly
   WallSide side = this->SideOf(hit, p);
@@ -320,7 +218,7 @@ WallSide VesselWall::Internals::Judge(WallMemory& memory, const WallHit& hit, co
       side = WallSide::Inside;
     }
   }
-  this->Know(memory, p, hit.distance);
+  this->RememberDistance(memory, p, hit.distance);
   return side;
 }
 
@@ -337,7 +235,7 @@ void VesselWall::Internals::Search(WallMemory& memory, const Vector3& p, double 
   {
     memory.nearest = hit.triangle;
     memory.patch = this->Triangles[hit.triangle].patch;
-    memory.side = this->Judge(memory, hit, from);
+    memory.side = this->SideSinceSeen(memory, hit, from);
   };
   const double radius = range + this->Blend + this->Settings.margin;
   // Far from the wall it is not worth while to know which place is the nearest (in the middle of a vessel all its
@@ -347,7 +245,7 @@ void VesselWall::Internals::Search(WallMemory& memory, const Vector3& p, double 
     WallHit known;
     known.triangle = memory.nearest;
     known.on = this->Nearest(memory.nearest, p);
-    known.distance = std::sqrt(known.on.squared);
+    known.distance = std::sqrt(known.on.squaredDistance);
     const double empty = 0.6 * known.distance;
     if (empty > radius && this->Collect(memory, known, p, empty) >= empty)
     {
@@ -395,7 +293,7 @@ bool VesselWall::Internals::Evaluate(
     double known = Infinity;
     if (memory.nearest >= 0)
     {
-      known = std::sqrt(this->Nearest(memory.nearest, p).squared);
+      known = std::sqrt(this->Nearest(memory.nearest, p).squaredDistance);
     }
     const double wanted = memory.side == WallSide::Outside ? known : std::min(known, range);
     const auto limit = static_cast<float>(wanted + this->Blend) * 1.00001f + 1e-5f;
@@ -430,7 +328,7 @@ bool VesselWall::Internals::Evaluate(
     const bool found = nearest.distance + drift <= memory.radius;
     if (found)
     {
-      memory.side = this->Judge(memory, nearest, p);
+      memory.side = this->SideSinceSeen(memory, nearest, p);
       memory.nearest = nearest.triangle;
       memory.patch = this->Triangles[nearest.triangle].patch;
     }
@@ -452,7 +350,7 @@ WallHit VesselWall::Internals::Look(WallCandidate& candidate, const Vector3& p) 
   WallHit hit;
   hit.triangle = candidate.triangle;
   hit.on = this->Nearest(candidate.triangle, p);
-  hit.distance = std::sqrt(hit.on.squared);
+  hit.distance = std::sqrt(hit.on.squaredDistance);
   candidate.distance = static_cast<float>(hit.distance) * 0.999999f - 2e-6f;
   candidate.passed = this->Passed;
   std::copy(this->Offset, this->Offset + 3, candidate.place);
@@ -580,25 +478,20 @@ void VesselWall::BeginFrame(const std::vector<Vector3>& next, double seconds)
       "a key frame of the wall lasts " + std::to_string(seconds) + " s, not a positive time");
   }
   RequireWallPoints(next, data.Vertices.size());
+  std::swap(data.BoxesNow, data.BoxesNext);
   double change = 0.0;
   Eigen::Array4f extent = Eigen::Array4f::Zero();
   const double rate = 1.0 / seconds;
   const double oldRate = 1.0 / data.Seconds;
   for (std::size_t i = 0; i < next.size(); ++i)
   {
-    WallVertex& v = data.Vertices[i];
+    const WallVertex& v = data.Vertices[i];
     const Vector3& p = next[data.VertexOf[i]];
     change = std::max(change, (rate * (p - v.next) - oldRate * (v.next - v.now)).squaredNorm());
-    v.now = v.next;
-    v.next = p;
-    const Vector3 relative = p - data.Centre;
-    data.Coordinates[i] = Eigen::Array4f(static_cast<float>(relative[0]),
-      static_cast<float>(relative[1]), static_cast<float>(relative[2]), 0.0f);
-    extent = extent.max(data.Coordinates[i].abs());
+    extent = extent.max(data.SetNext(i, p).abs());
   }
+  data.ExtentNow = std::exchange(data.ExtentNext, extent.maxCoeff());
   data.VelocityChange = std::sqrt(change) * (1.0 + 1e-12) + 1e-12;
-  data.Now = 1 - data.Now;
-  data.Extent[1 - data.Now] = extent.maxCoeff();
   data.FrameBegin += data.Seconds;
   data.Seconds = seconds;
   data.Rate = rate;
@@ -631,7 +524,7 @@ void VesselWall::Find(const ContactSample& sample, double reach, SampleContacts&
   if (data.Valid(memory, sample.centre, drift) && memory.side != WallSide::Outside &&
     drift + range < memory.clearance)
   {
-    data.Know(memory, sample.centre, memory.clearance - drift);
+    data.RememberDistance(memory, sample.centre, memory.clearance - drift);
     memory.planes = 0;
     return;
   }
@@ -764,7 +657,7 @@ WallPlace VesselWall::Locate(const ContactSample& sample)
   const WallHit nearest = data.ClosestTo(sample.centre, memory.patch, memory.nearest);
   memory.nearest = nearest.triangle;
   memory.patch = data.Triangles[nearest.triangle].patch;
-  return data.PlaceFrom(nearest, data.Judge(memory, nearest, sample.centre));
+  return data.PlaceFrom(nearest, data.SideSinceSeen(memory, nearest, sample.centre));
 }
 
 void VesselWall::Place(std::int64_t sample, std::int64_t triangle)
@@ -774,44 +667,31 @@ void VesselWall::Place(std::int64_t sample, std::int64_t triangle)
   {
     throw std::invalid_argument("the wall has no triangle " + std::to_string(triangle));
   }
-  WallMemory& memory = data.Of(sample);
-  memory.Reset(sample);
-  memory.nearest = data.PlaceOf[triangle];
-  memory.patch = data.Triangles[memory.nearest].patch;
+  const std::int32_t nearest = data.PlaceOf[triangle];
+  data.Place(sample, data.Triangles[nearest].patch, nearest);
 }
 
 bool VesselWall::PlaceBeside(std::int64_t sample, std::int64_t neighbour)
 {
   Internals& data = *this->Data;
-  const std::int32_t slot = data.FindSlot(neighbour);
-  if (slot < 0 || data.Memories[slot].patch < 0)
+  const auto known = data.Memories.find(neighbour);
+  if (known == data.Memories.end() || known->second.patch < 0)
   {
     return false;
   }
-  const std::int32_t patch = data.Memories[slot].patch;
-  const std::int32_t nearest = data.Memories[slot].nearest;
-  WallMemory& memory = data.Of(sample);
-  memory.Reset(sample);
-  memory.patch = patch;
-  memory.nearest = nearest;
+  const auto [patch, nearest] = std::pair(known->second.patch, known->second.nearest);
+  data.Place(sample, patch, nearest);
   return true;
 }
 
 void VesselWall::Forget(std::int64_t sample)
 {
-  this->Data->Forget(sample);
+  this->Data->Memories.erase(sample);
 }
 
 void VesselWall::ForgetAll()
 {
-  Internals& data = *this->Data;
-  data.Unused.clear();
-  for (auto i = static_cast<std::int32_t>(data.Memories.size()) - 1; i >= 0; --i)
-  {
-    data.Unused.push_back(i);
-  }
-  std::fill(data.Table.begin(), data.Table.end(), -1);
-  data.Known = 0;
+  this->Data->Memories.clear();
 }
 
 WallPlace VesselWall::Closest(const Vector3& p)
@@ -836,7 +716,7 @@ void VesselWall::Within(const Vector3& p, double distance, std::vector<std::int6
   data.ForEachNear(p, Vector3::Zero(), 0.0, bound,
     [&](std::int32_t triangle)
     {
-      if (data.Nearest(triangle, p).squared <= bound * bound)
+      if (data.Nearest(triangle, p).squaredDistance <= bound * bound)
       {
         triangles.push_back(data.TriangleOf[triangle]);
       }

@@ -2,10 +2,9 @@
  * @file VesselWall.h
  * @brief The inside of the moving lumen as something that instruments touch.
  *
- * A hierarchy of boxes is built once, and refitted at every key frame of the motion (8 boxes a node, as
- * TriangleBvh). Between two key frames points move evenly, so the velocity of the wall's material is exact.
- * Every sample of an instrument keeps the triangles near it, with bounds that tell when they have to be looked
- * up again. Sign of the distance: Baerentzen & Aanaes, "Signed distance computation using the angle weighted
+ * A BoxTree is built once, and its boxes are made anew at every key frame of the motion. Between two key frames
+ * points move evenly, so the velocity of the wall's material is exact. Every sample of an instrument keeps the
+ * triangles near it, with bounds that tell when they have to be looked up again. Sign of the distance: Baerentzen & Aanaes, "Signed distance computation using the angle weighted
  * pseudonormal", IEEE TVCG 2005.
  */
 #ifndef DynamicCoronary_VesselWall_h

@@ -1,10 +1,10 @@
+#include "TriangleSides.h"
 #include "VesselWallData.h"
 
 #include <map>
 #include <queue>
 #include <stdexcept>
 #include <string>
-#include <tuple>
 #include <utility>
 
 namespace coronary
@@ -63,46 +63,28 @@ std::vector<std::array<std::int32_t, 3>> Neighbours(
       }
     }
   }
-  // Half edges, sorted: each one and its opposite once.
-  struct HalfEdge
-  {
-    std::int64_t low, high;
-    bool rising;
-    std::int32_t triangle;
-    int edge;
-  };
-  std::vector<HalfEdge> edges;
-  edges.reserve(3 * count);
-  for (std::size_t i = 0; i < count; ++i)
-  {
-    for (int k = 0; k < 3; ++k)
-    {
-      const std::int64_t from = topology.triangles[i][k];
-      const std::int64_t to = topology.triangles[i][(k + 1) % 3];
-      edges.push_back(
-        { std::min(from, to), std::max(from, to), from < to, static_cast<std::int32_t>(i), k });
-    }
-  }
-  std::sort(edges.begin(), edges.end(),
-    [](const HalfEdge& s, const HalfEdge& t)
-    {
-      return std::tie(s.low, s.high, s.rising, s.triangle) <
-        std::tie(t.low, t.high, t.rising, t.triangle);
-    });
   std::vector<std::array<std::int32_t, 3>> beyond(count);
-  for (std::size_t i = 0; i < edges.size(); i += 2)
-  {
-    const auto same = [&](std::size_t j)
-    { return j < edges.size() && edges[j].low == edges[i].low && edges[j].high == edges[i].high; };
-    if (!same(i + 1) || same(i + 2) || edges[i].rising == edges[i + 1].rising)
+  const std::vector<TriangleSide> sides =
+    SidesOf(topology.triangles, [](const Triangle& t) -> const Triangle& { return t; });
+  ForEdges(sides,
+    [&](std::size_t first, std::size_t size)
     {
-      throw std::invalid_argument("the edge between points " + std::to_string(edges[i].low) +
-        " and " + std::to_string(edges[i].high) +
-        " of the wall does not belong to two triangles that run along it in opposite directions");
-    }
-    beyond[edges[i].triangle][edges[i].edge] = edges[i + 1].triangle;
-    beyond[edges[i + 1].triangle][edges[i + 1].edge] = edges[i].triangle;
-  }
+      const TriangleSide& one = sides[first];
+      if (size != 2 || one.rising == sides[first + 1].rising)
+      {
+        throw std::invalid_argument("the edge between points " + std::to_string(one.low) + " and " +
+          std::to_string(one.high) +
+          " of the wall does not belong to two triangles that run along it in opposite directions");
+      }
+      for (const std::size_t side : { first, first + 1 })
+      {
+        const std::int64_t triangle = sides[side].triangle;
+        const Triangle& t = topology.triangles[triangle];
+        const std::int64_t from = sides[side].rising ? one.low : one.high;
+        beyond[triangle][std::find(t.begin(), t.end(), from) - t.begin()] =
+          static_cast<std::int32_t>(sides[2 * first + 1 - side].triangle);
+      }
+    });
 
   // Components, and whether they look outwards.
   std::vector<char> seen(count, 0);
@@ -193,9 +175,8 @@ void VesselWall::Internals::Build(const WallTopology& topology, const std::vecto
     }
   }
 
-  // Checks the indices, too.
-  const TriangleBvh order(points, topology.triangles);
-  this->TriangleOf = order.Order();
+  this->Tree = BoxTree(points, topology.triangles);
+  this->TriangleOf = this->Tree.Order();
   this->PlaceOf.resize(count);
   std::vector<std::int32_t> vertexPlace(points.size(), -1);
   this->Triangles.resize(count);
@@ -273,40 +254,12 @@ void VesselWall::Internals::Build(const WallTopology& topology, const std::vecto
       this->Around[fill[v]++] = static_cast<std::int32_t>(i);
     }
   }
-  this->BuildHierarchy(points);
-  this->BuildPatches();
-  this->Table.assign(256, -1);
-  this->Memories.reserve(128);
-  this->Hits.reserve(256);
-  this->Later.reserve(256);
-}
-
-/// Leaves in the order of the tree that TriangleBvh builds, whose subtrees are full.
-void VesselWall::Internals::BuildHierarchy(const std::vector<Vector3>& points)
-{
-  const std::size_t count = this->Triangles.size();
-  const auto leaves = static_cast<std::int64_t>((count + WallLeafSize - 1) / WallLeafSize);
-  std::int64_t below = leaves;
-  do
-  {
-    below = (below + WallBoxWidth - 1) / WallBoxWidth;
-    this->LevelBegin.push_back(static_cast<std::int64_t>(this->Nodes.size()));
-    this->LevelSize.push_back(below);
-    this->Nodes.resize(this->Nodes.size() + below);
-  } while (below > 1);
-  for (WallNode& node : this->Nodes)
-  {
-    // What is missing is far away.
-    std::fill(&node.low[0][0][0], &node.low[0][0][0] + 2 * 3 * WallBoxWidth, 1e15f);
-    std::fill(&node.high[0][0][0], &node.high[0][0][0] + 2 * 3 * WallBoxWidth, 1e15f);
-  }
   std::vector<std::int32_t> corners;
   this->LeafBegin.push_back(0);
-  for (std::int64_t i = 0; i < leaves; ++i)
+  for (std::size_t i = 0; i < count; i += BoxTree::LeafSize)
   {
     corners.clear();
-    for (auto t = static_cast<std::size_t>(WallLeafSize * i);
-         t < std::min(count, static_cast<std::size_t>(WallLeafSize * (i + 1))); ++t)
+    for (std::size_t t = i; t < std::min(count, i + BoxTree::LeafSize); ++t)
     {
       corners.insert(
         corners.end(), this->Triangles[t].vertex.begin(), this->Triangles[t].vertex.end());
@@ -316,26 +269,20 @@ void VesselWall::Internals::BuildHierarchy(const std::vector<Vector3>& points)
     this->LeafVertices.insert(this->LeafVertices.end(), corners.begin(), corners.end());
     this->LeafBegin.push_back(static_cast<std::int32_t>(this->LeafVertices.size()));
   }
-  Vector3 low = points[0];
-  Vector3 high = points[0];
-  for (const Vector3& p : points)
-  {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  this->Centre = 0.5 * (low + high);
   this->Coordinates.resize(points.size());
-  for (int time = 0; time < 2; ++time)
+  Eigen::Array4f extent = Eigen::Array4f::Zero();
+  for (std::size_t i = 0; i < points.size(); ++i)
   {
-    this->Now = 1 - this->Now;
-    for (std::size_t i = 0; i < points.size(); ++i)
-    {
-      const Vector3 relative = this->Vertices[i].next - this->Centre;
-      this->Coordinates[i] << relative.cast<float>().array(), 0.0f;
-    }
-    this->Extent[1 - this->Now] = (0.5 * (high - low)).maxCoeff();
-    this->Refit();
+    extent = extent.max(this->SetNext(i, this->Vertices[i].next).abs());
   }
+  this->ExtentNow = this->ExtentNext = extent.maxCoeff();
+  this->BoxesNext = this->Tree.EmptyNodes();
+  this->Refit();
+  this->BoxesNow = this->BoxesNext;
+  this->BuildPatches();
+  this->Memories.reserve(256);
+  this->Hits.reserve(256);
+  this->Later.reserve(256);
 }
 
 void VesselWall::Internals::BuildPatches()
@@ -443,9 +390,7 @@ void VesselWall::Internals::BuildPatches()
 
 void VesselWall::Internals::Refit()
 {
-  const int next = 1 - this->Now;
-  // Single precision rounds to nearest here; queries are padded for it.
-  const auto leaves = static_cast<std::int64_t>(this->LeafBegin.size()) - 1;
+  const std::int64_t leaves = this->Tree.Leaves();
   for (std::int64_t i = 0; i < leaves; ++i)
   {
     const std::int32_t* vertex = this->LeafVertices.data() + this->LeafBegin[i];
@@ -457,41 +402,8 @@ void VesselWall::Internals::Refit()
       low = low.min(this->Coordinates[*vertex]);
       high = high.max(this->Coordinates[*vertex]);
     }
-    WallNode& node = this->Nodes[i / WallBoxWidth];
-    const std::int64_t lane = i % WallBoxWidth;
-    for (int k = 0; k < 3; ++k)
-    {
-      node.low[next][k][lane] = low[k];
-      node.high[next][k][lane] = high[k];
-    }
+    this->Tree.SetLeaf(this->BoxesNext, i, low.data(), high.data());
   }
-  for (std::size_t level = 1; level < this->LevelBegin.size(); ++level)
-  {
-    const WallNode* below = this->Nodes.data() + this->LevelBegin[level - 1];
-    const std::int64_t size = this->LevelSize[level - 1];
-    for (std::int64_t i = 0; i < size; ++i)
-    {
-      // The last node may have missing boxes; they are not part of the box around.
-      std::int64_t lanes = WallBoxWidth;
-      if (i == size - 1)
-      {
-        const std::int64_t total = level == 1 ? leaves : this->LevelSize[level - 2];
-        lanes = total - WallBoxWidth * i;
-      }
-      WallNode& node = this->Nodes[this->LevelBegin[level] + i / WallBoxWidth];
-      for (int k = 0; k < 3; ++k)
-      {
-        float low = below[i].low[next][k][0];
-        float high = below[i].high[next][k][0];
-        for (std::int64_t lane = 1; lane < lanes; ++lane)
-        {
-          low = std::min(low, below[i].low[next][k][lane]);
-          high = std::max(high, below[i].high[next][k][lane]);
-        }
-        node.low[next][k][i % WallBoxWidth] = low;
-        node.high[next][k][i % WallBoxWidth] = high;
-      }
-    }
-  }
+  BoxTree::FitAbove(this->BoxesNext);
 }
 }

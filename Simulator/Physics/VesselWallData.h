@@ -5,27 +5,20 @@
 #ifndef DynamicCoronary_VesselWallData_h
 #define DynamicCoronary_VesselWallData_h
 
+#include "BoxTree.h"
+#include "NearestOnTriangle.h"
 #include "VesselWall.h"
-#include "WallTriangle.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <unordered_map>
 
 namespace coronary
 {
 constexpr double MaximumWallCoordinate = 1e5;
-constexpr int WallBoxWidth = 8;
-constexpr int WallLeafSize = 4;
 constexpr double Infinity = std::numeric_limits<double>::infinity();
-
-/// Boxes of the children at both key frames, relative to the hierarchy's centre.
-struct alignas(64) WallNode
-{
-  float low[2][3][WallBoxWidth];
-  float high[2][3][WallBoxWidth];
-};
 
 struct WallVertex
 {
@@ -53,7 +46,7 @@ struct WallHit
 {
   std::int32_t triangle = -1;
   double distance = Infinity;
-  WallTrianglePoint on;
+  TrianglePoint on;
   bool hasNormal = false;
   Vector3 normal = Vector3::Zero();
 };
@@ -109,20 +102,6 @@ struct WallMemory
   int planes = 0;
   std::array<Vector3, 2> normal;
   std::array<int, 2> identity{};
-
-  void Reset(std::int64_t newIndex)
-  {
-    this->index = newIndex;
-    this->patch = -1;
-    this->nearest = -1;
-    this->side = WallSide::Inside;
-    this->frame = -2;
-    this->known = false;
-    this->seenFrame = -2;
-    this->range = 0.0;
-    this->planes = 0;
-    this->list.clear();
-  }
 };
 
 inline bool UsableWallPoint(const Vector3& p)
@@ -155,16 +134,15 @@ struct VesselWall::Internals
   std::vector<std::int32_t> Around; ///< triangles around a vertex
   std::vector<WallVertexNormal> VertexNormals;
 
-  // Boxes.
-  Vector3 Centre = Vector3::Zero();
-  std::vector<std::int64_t> LevelBegin; ///< of the nodes above the leaves, then of those above them
-  std::vector<std::int64_t> LevelSize;
-  std::vector<WallNode> Nodes;
+  // Boxes, at both key frames. Single precision rounds to nearest there; queries are padded for it.
+  BoxTree Tree;
+  std::vector<BoxNode> BoxesNow;
+  std::vector<BoxNode> BoxesNext;
+  double ExtentNow = 0.0; ///< greatest coordinate relative to the tree's centre
+  double ExtentNext = 0.0;
   std::vector<std::int32_t> LeafBegin; ///< into LeafVertices
   std::vector<std::int32_t> LeafVertices;
-  std::vector<Eigen::Array4f> Coordinates; ///< of the next key frame, relative to the centre
-  double Extent[2] = { 0.0, 0.0 };         ///< greatest coordinate relative to the centre
-  int Now = 0;                             ///< which of the boxes are those of `now`
+  std::vector<Eigen::Array4f> Coordinates; ///< of the next key frame, relative to the tree's centre
 
   // Time.
   std::int64_t Frame = 0;
@@ -182,10 +160,7 @@ struct VesselWall::Internals
   std::int32_t MarkedPatch = -1;
 
   // Samples.
-  std::vector<WallMemory> Memories;
-  std::vector<std::int32_t> Unused;
-  std::vector<std::int32_t> Table; ///< open addressing: into Memories, -1: empty
-  std::size_t Known = 0;
+  std::unordered_map<std::int64_t, WallMemory> Memories; ///< by their number
   std::uint64_t Searches = 0;
 
   // Of the evaluation that was last.
@@ -208,10 +183,10 @@ struct VesselWall::Internals
     const WallVertex& v = this->Vertices[vertex];
     return this->Rate * (v.next - v.now);
   }
-  WallTrianglePoint Nearest(std::int32_t triangle, const Vector3& p, double beyond = Infinity) const
+  TrianglePoint Nearest(std::int32_t triangle, const Vector3& p, double beyond = Infinity) const
   {
     const std::array<std::int32_t, 3>& v = this->Triangles[triangle].vertex;
-    return NearestOn(p, this->At(v[0]), this->At(v[1]), this->At(v[2]), beyond);
+    return NearestOnTriangle(p, this->At(v[0]), this->At(v[1]), this->At(v[2]), beyond);
   }
   /// Outwards, as long as twice the area.
   Vector3 FaceNormal(std::int32_t triangle) const
@@ -360,8 +335,18 @@ struct VesselWall::Internals
   // ---- Set up.
 
   void Build(const WallTopology& topology, const std::vector<Vector3>& points);
-  void BuildHierarchy(const std::vector<Vector3>& points);
   void BuildPatches();
+  /// @return its coordinates relative to the tree's centre
+  const Eigen::Array4f& SetNext(std::size_t vertex, const Vector3& p)
+  {
+    WallVertex& v = this->Vertices[vertex];
+    v.now = v.next;
+    v.next = p;
+    const Vector3 relative = p - this->Tree.Centre();
+    this->Coordinates[vertex] << relative.cast<float>().array(), 0.0f;
+    return this->Coordinates[vertex];
+  }
+  /// Puts boxes around the vertices that come next.
   void Refit();
 
   // ---- Boxes.
@@ -369,7 +354,7 @@ struct VesselWall::Internals
   float Padding(const Vector3& relative) const
   {
     const double extent =
-      std::max({ this->Extent[0], this->Extent[1], relative.cwiseAbs().maxCoeff() });
+      std::max({ this->ExtentNow, this->ExtentNext, relative.cwiseAbs().maxCoeff() });
     return static_cast<float>(4e-6 * extent + 1e-6);
   }
 
@@ -402,43 +387,16 @@ struct VesselWall::Internals
 
   // ---- Samples.
 
-  static std::size_t Hash(std::int64_t index)
-  {
-    auto x = static_cast<std::uint64_t>(index) * 0x9E3779B97F4A7C15ull;
-    return static_cast<std::size_t>(x ^ (x >> 29));
-  }
-  std::int32_t FindSlot(std::int64_t index) const
-  {
-    const std::size_t mask = this->Table.size() - 1;
-    for (std::size_t i = Hash(index) & mask;; i = (i + 1) & mask)
-    {
-      const std::int32_t slot = this->Table[i];
-      if (slot < 0 || this->Memories[slot].index == index)
-      {
-        return slot;
-      }
-    }
-  }
-  void Insert(std::int32_t slot)
-  {
-    const std::size_t mask = this->Table.size() - 1;
-    std::size_t i = Hash(this->Memories[slot].index) & mask;
-    while (this->Table[i] >= 0)
-    {
-      i = (i + 1) & mask;
-    }
-    this->Table[i] = slot;
-  }
   WallMemory& Of(std::int64_t index);
-  void Forget(std::int64_t index);
+  void Place(std::int64_t index, std::int32_t patch, std::int32_t nearest);
 
   /// Since triangles were looked up, and how far the sample may be from its path against the wall.
   bool Valid(const WallMemory& memory, const Vector3& p, double& drift) const;
   void Search(WallMemory& memory, const Vector3& p, double range);
   /// SideOf, unless the sample can not have got there since it was seen: next to slivers of the mesh the side of
   /// a place may be told wrongly.
-  WallSide Judge(WallMemory& memory, const WallHit& hit, const Vector3& p);
-  void Know(WallMemory& memory, const Vector3& p, double distance);
+  WallSide SideSinceSeen(WallMemory& memory, const WallHit& hit, const Vector3& p);
+  void RememberDistance(WallMemory& memory, const Vector3& p, double distance);
   /// Fills the list for the path that begins at p and moves with the wall at `hit`; the least distance now.
   double Collect(WallMemory& memory, const WallHit& hit, const Vector3& p, double radius);
   /// The nearest places of all triangles that matter; false if there is no wall within `range` (and then

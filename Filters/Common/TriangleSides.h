@@ -1,4 +1,4 @@
-// The edges of a triangle surface, whatever its triangles are kept in. Inside the library only.
+// The edges of a triangle surface, whatever its triangles are kept in. Not installed.
 #ifndef DynamicCoronary_TriangleSides_h
 #define DynamicCoronary_TriangleSides_h
 

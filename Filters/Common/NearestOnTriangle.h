@@ -1,32 +1,48 @@
 /**
- * @file WallTriangle.h
+ * @file NearestOnTriangle.h
  * @brief The nearest place of a triangle, fast where triangles are sound and right where they are slivers.
  */
-#ifndef DynamicCoronary_WallTriangle_h
-#define DynamicCoronary_WallTriangle_h
+#ifndef DynamicCoronary_NearestOnTriangle_h
+#define DynamicCoronary_NearestOnTriangle_h
 
-#include "TriangleBvh.h"
+#include "Geometry.h"
 
 #include <algorithm>
 #include <limits>
 
 namespace coronary
 {
-struct WallTrianglePoint
+/// Where on a triangle a nearest point lies.
+enum class TriangleFeature : int
+{
+  Face = 0,
+  EdgeAB = 1,
+  EdgeBC = 2,
+  EdgeCA = 3,
+  A = 4,
+  B = 5,
+  C = 6
+};
+
+struct TrianglePoint
 {
   Vector3 point = Vector3::Zero();
-  double squared = std::numeric_limits<double>::infinity();
+  double squaredDistance = std::numeric_limits<double>::infinity();
   double b = 0.0; ///< barycentric of the second and third corner
   double c = 0.0;
   TriangleFeature feature = TriangleFeature::Face;
 };
 
-/// The same for any triangle.
-WallTrianglePoint NearestOnSliver(
+/// What NearestOnTriangle is where the triangle is almost a line or a point.
+TrianglePoint NearestOnSliver(
   const Vector3& p, const Vector3& a, const Vector3& b, const Vector3& c);
 
-/// @param beyond  mm; if the triangle is certainly further, its square may be infinite
-inline WallTrianglePoint NearestOn(const Vector3& p, const Vector3& a, const Vector3& b,
+/**
+ * The point of a triangle that is nearest to p. The triangle may be a line or a point: one of its edges or corners is
+ * named then. After Ericson, Real-Time Collision Detection, 2005, 5.1.5.
+ * @param beyond  if the triangle is certainly further, the squared distance may be infinite
+ */
+inline TrianglePoint NearestOnTriangle(const Vector3& p, const Vector3& a, const Vector3& b,
   const Vector3& c, double beyond = std::numeric_limits<double>::infinity())
 {
   const Vector3 ab = b - a;
@@ -35,7 +51,7 @@ inline WallTrianglePoint NearestOn(const Vector3& p, const Vector3& a, const Vec
   const double d00 = ab.squaredNorm();
   const double d01 = ab.dot(ac);
   const double d11 = ac.squaredNorm();
-  WallTrianglePoint on;
+  TrianglePoint on;
   if (beyond < std::numeric_limits<double>::infinity())
   {
     const double longest = std::max(d00, d11);
@@ -61,7 +77,7 @@ inline WallTrianglePoint NearestOn(const Vector3& p, const Vector3& a, const Vec
     on.b = scale * v;
     on.c = scale * w;
     on.point = a + on.b * ab + on.c * ac;
-    on.squared = (p - on.point).squaredNorm();
+    on.squaredDistance = (p - on.point).squaredNorm();
     return on;
   }
   // The nearest point is on an edge that p sees: one or two of them.
@@ -110,7 +126,7 @@ inline WallTrianglePoint NearestOn(const Vector3& p, const Vector3& a, const Vec
   on.b = x;
   on.c = y;
   on.point = a + x * ab + y * ac;
-  on.squared = (p - on.point).squaredNorm();
+  on.squaredDistance = (p - on.point).squaredNorm();
   on.feature = feature;
   return on;
 }
