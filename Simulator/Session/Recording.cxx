@@ -5,6 +5,8 @@
 #include "JsonFields.h"
 #include "WallMotion.h"
 
+#include <zlib.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -219,31 +221,12 @@ RecordingHeader HeaderOf(const std::string& text, const std::string& origin, std
 }
 
 constexpr std::size_t ChunkHead = 4 + 1 + 8;
-}
 
-std::uint32_t Crc32(const void* data, std::size_t size, std::uint32_t before)
+std::uint64_t CheckSum(const std::string& bytes, std::uint64_t before = 0)
 {
-  static const std::array<std::uint32_t, 256> table = []
-  {
-    std::array<std::uint32_t, 256> entries{};
-    for (std::uint32_t n = 0; n < 256; ++n)
-    {
-      std::uint32_t value = n;
-      for (int bit = 0; bit < 8; ++bit)
-      {
-        value = (value & 1U) != 0 ? (value >> 1) ^ 0xEDB88320U : value >> 1;
-      }
-      entries[n] = value;
-    }
-    return entries;
-  }();
-  const auto* bytes = static_cast<const unsigned char*>(data);
-  std::uint32_t crc = ~before;
-  for (std::size_t n = 0; n < size; ++n)
-  {
-    crc = (crc >> 8) ^ table[(crc ^ bytes[n]) & 0xFFU];
-  }
-  return ~crc;
+  return crc32(static_cast<uLong>(before), reinterpret_cast<const Bytef*>(bytes.data()),
+    static_cast<uInt>(bytes.size()));
+}
 }
 
 std::string Hexadecimal(std::uint64_t value)
@@ -296,7 +279,7 @@ struct RecordingWriter::Internals
     bytes.push_back(static_cast<char>(type));
     PutLittle(bytes, tick, 8);
     bytes += payload;
-    PutLittle(bytes, Crc32(bytes.data(), bytes.size()), 4);
+    PutLittle(bytes, CheckSum(bytes), 4);
     this->Write(bytes);
   }
 
@@ -601,7 +584,7 @@ struct RecordingReader::Internals
       {
         return this->End(Ending::Torn, "its last chunk breaks off");
       }
-      if (Crc32(payload.data(), size, Crc32(head.data(), head.size())) != Little(&sum[0], 4))
+      if (CheckSum(payload, CheckSum(head)) != Little(&sum[0], 4))
       {
         return this->Damaged("the check sum of a chunk does not fit");
       }

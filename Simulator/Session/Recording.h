@@ -22,9 +22,7 @@
 
 namespace coronary
 {
-/// CRC-32/ISO-HDLC (polynomial 0x04C11DB7 reflected, all ones before and after): of "123456789" 0xCBF43926.
-/// @param before  the value of what comes before, to go on from
-std::uint32_t Crc32(const void* data, std::size_t size, std::uint32_t before = 0);
+class WallMotion;
 
 /// 16 digits, as hashes are written.
 std::string Hexadecimal(std::uint64_t value);

@@ -15,6 +15,8 @@
 #include <sstream>
 #include <unistd.h>
 
+#include <zlib.h>
+
 using coronary::RecordedItem;
 using coronary::RecordingReader;
 using coronary::RecordingWriter;
@@ -184,7 +186,8 @@ std::string Chunk(std::uint8_t type, std::uint64_t tick, const std::string& payl
     bytes.push_back(static_cast<char>(tick >> (8 * n)));
   }
   bytes += payload;
-  const std::uint32_t crc = coronary::Crc32(bytes.data(), bytes.size());
+  const auto crc =
+    crc32(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size()));
   for (int n = 0; n < 4; ++n)
   {
     bytes.push_back(static_cast<char>(crc >> (8 * n)));
@@ -201,11 +204,8 @@ std::size_t HeaderSize(const std::string& bytes)
 }
 }
 
-TEST(UnitTestRecording, CheckSumsAreTheStandardOnes)
+TEST(UnitTestRecording, HashesAreTheStandardOnes)
 {
-  EXPECT_EQ(coronary::Crc32("123456789", 9), 0xCBF43926U);
-  EXPECT_EQ(coronary::Crc32("6789", 4, coronary::Crc32("12345", 5)), 0xCBF43926U);
-  EXPECT_EQ(coronary::Crc32("", 0), 0U);
   // From the authors' test vectors.
   EXPECT_EQ(coronary::Fnv1a("", 0), 0xcbf29ce484222325U);
   EXPECT_EQ(coronary::Fnv1a("a", 1), 0xaf63dc4c8601ec8cU);

@@ -11,6 +11,8 @@
 #include <memory>
 #include <sstream>
 
+#include <zlib.h>
+
 using namespace coronary;
 
 namespace fuzzing
@@ -157,7 +159,7 @@ void ReadChunks(const std::string& bytes)
     chunk.push_back(type);
     put(tick, 8);
     chunk += payload;
-    put(Crc32(chunk.data(), chunk.size()), 4);
+    put(crc32(0, reinterpret_cast<const Bytef*>(chunk.data()), static_cast<uInt>(chunk.size())), 4);
     recording += chunk;
   }
   ReadRecording(recording);

@@ -5,7 +5,8 @@
 #ifndef DynamicCoronary_SessionInput_h
 #define DynamicCoronary_SessionInput_h
 
-#include "Intervention.h"
+#include "DriveInput.h"
+#include "Geometry.h"
 
 #include <cstdint>
 

@@ -1,6 +1,6 @@
 #include "DeviceProtocol.h"
 
-#include "Recording.h"
+#include <zlib.h>
 
 #include <algorithm>
 #include <cmath>
@@ -184,7 +184,7 @@ WireFrame EncodeFrame(const Message& message)
   PutLittle(&frame[4], message.microseconds, 4);
   std::copy_n(message.payload.begin(), payload, frame.begin() + FrameHead);
   const std::size_t covered = FrameHead + payload;
-  PutLittle(&frame[covered], Crc32(frame.data(), covered), FrameTail);
+  PutLittle(&frame[covered], crc32(0, frame.data(), static_cast<uInt>(covered)), FrameTail);
   WireFrame wire;
   wire.size = CobsEncode(frame.data(), covered + FrameTail, wire.bytes.data());
   wire.bytes[wire.size++] = 0;
@@ -230,7 +230,8 @@ bool FrameDecoder::Complete()
   const std::size_t size = CobsDecode(this->Bytes.data(), this->Size);
   const std::uint8_t* frame = this->Bytes.data();
   if (size < FrameHead + FrameTail || size > MostFrame ||
-    Little(frame + size - FrameTail, FrameTail) != Crc32(frame, size - FrameTail))
+    Little(frame + size - FrameTail, FrameTail) !=
+      crc32(0, frame, static_cast<uInt>(size - FrameTail)))
   {
     ++this->Counters.damaged;
     return false;

@@ -1,6 +1,7 @@
 #include "vtkSessionWindow.h"
 
 #include "AtomicFile.h"
+#include "DeviceUri.h"
 #include "HeadlessSession.h"
 #include "HeartShell.h"
 #include "InstrumentCatalogue.h"

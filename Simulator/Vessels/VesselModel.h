@@ -9,7 +9,7 @@
 
 #include "ParallelFor.h"
 #include "PatientHeart.h"
-#include "Scenario.h"
+#include "VesselSource.h"
 #include "WallMotion.h"
 
 #include <memory>

@@ -5,10 +5,9 @@
 #ifndef DynamicCoronary_HeartShell_h
 #define DynamicCoronary_HeartShell_h
 
-#include "CoronaryPhantom.h"
 #include "PatientHeart.h"
 #include "PeriodicSpline.h"
-#include "Scenario.h"
+#include "VesselSource.h"
 #include "WallMotion.h"
 
 #include <memory>

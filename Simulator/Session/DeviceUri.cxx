@@ -1,4 +1,4 @@
-#include "Device.h"
+#include "DeviceUri.h"
 
 #include "GamepadDevice.h"
 #include "KeyboardDevice.h"
