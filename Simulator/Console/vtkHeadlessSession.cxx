@@ -409,7 +409,7 @@ private:
     this->Statistics.Add(report.tick);
     if (tick % RecordedHashInterval == 0)
     {
-      this->Hashes.push_back(Hexadecimal(this->Runner.Session().StateHash()));
+      this->Hashes.push_back(Hexadecimal(this->Runner.StateHash()));
     }
     SessionPictures::FolderCallback folder;
     if (this->Files)
@@ -438,7 +438,7 @@ private:
     }
   }
 
-  Json Result() const
+  Json Result()
   {
     const WallTopology& topology = this->Runner.Session().Topology();
     const Scenario& scenario = this->World.scenario;
@@ -456,7 +456,7 @@ private:
     result["metrics"] = MetricsToJson(this->Runner.Session().Metrics(), topology);
     result["state_hash_interval"] = RecordedHashInterval;
     result["state_hashes"] = this->Hashes;
-    result["last_state_hash"] = Hexadecimal(this->Runner.Session().StateHash());
+    result["last_state_hash"] = Hexadecimal(this->Runner.StateHash());
     if (this->Replay)
     {
       result["replay"] = { { "compared", this->Runner.Compared().compared },

@@ -112,7 +112,7 @@ public:
   }
 
 private:
-  /// What P hands on to others; the lock is held for a swap.
+  /// What one thread hands to another; the lock is held for a swap.
   template <typename T>
   struct Mailbox
   {
