@@ -1,39 +1,38 @@
 /**
  * @file vtkSessionWindow.h
- * @brief The window of a session: pictures, panel, keys.
+ * @brief The window of a session: monitor, anatomy, traces, panels, keys.
  */
 #ifndef vtkSessionWindow_h
 #define vtkSessionWindow_h
 
+#include "ContrastPanel.h"
 #include "FluoroscopyWidget.h"
+#include "HeartPanel.h"
 #include "IgtlOutput.h"
+#include "InstrumentPanel.h"
 #include "KeyboardDevice.h"
+#include "MetricsPanel.h"
 #include "PanelDevice.h"
 #include "SimulatorWindow.h"
 #include "TraceWidget.h"
+#include "ViewPanel.h"
+#include "XRayPanel.h"
 #include "vtkSimulatorScene.h"
-#include "vtkVideoFile.h"
+#include "vtkWindowRecorder.h"
 
 #include "QVTKOpenGLNativeWidget.h"
 #include "vtkGenericOpenGLRenderWindow.h"
 #include "vtkNew.h"
 
-#include <QCheckBox>
-#include <QComboBox>
-#include <QDoubleSpinBox>
 #include <QElapsedTimer>
 #include <QLabel>
 #include <QMainWindow>
 #include <QPlainTextEdit>
-#include <QPushButton>
-#include <QSlider>
 #include <QTimer>
 
 #include <memory>
 #include <string>
 #include <vector>
-
-class QGroupBox;
 
 namespace coronary
 {
@@ -57,18 +56,10 @@ protected:
   void changeEvent(QEvent* event) override;
 
 private:
-  // vtkSessionPanel.cxx
-  QWidget* MakePanel();
-  QGroupBox* MakeInstrumentGroup();
-  QGroupBox* MakeViewGroup();
-  QGroupBox* MakeXRayGroup();
-  QGroupBox* MakeContrastGroup();
-  QGroupBox* MakeHeartGroup();
-  QGroupBox* MakeAnatomyGroup();
-  QWidget* MakeMetrics();
+  QWidget* MakeCentre();
+  QWidget* MakePanels();
   void MakeToolBar();
-
-  void ConnectMouse();
+  void ConnectPanels();
 
   void ShowScenario();
   void Poll();
@@ -76,24 +67,17 @@ private:
   void ShowScene();
   void ShowImage();
   void SendPose();
-  void ShowNumbers(const SessionSnapshot& now);
   void ShowDevices();
   void ShowRates();
   void ShowCine();
-  void TakeDueScreenshots();
-  void RecordVideo();
+  void ShowKeys();
 
-  void PlaceView();
   void TakeScenarioOf(const std::string& recording);
   void Restart(const std::string& record, const std::string& replay);
   void End();
-  void Post(const RecordedEvent& event);
+  void Chosen(const RecordedEvent& event);
   void Problem(const QString& text);
-  void PressFluoroscopy();
-  void SaveScreenshot(const QString& path);
-  void SaveXRay(const QString& name);
   void PrintRates() const;
-  void ToggleVideo(bool on);
 
   SessionWorld World;
   WindowOptions Options;
@@ -103,56 +87,32 @@ private:
   std::shared_ptr<DeviceMux> Mux;
   std::unique_ptr<SessionEngine> Engine;
   std::unique_ptr<vtkSimulatorScene> Scene;
-  std::unique_ptr<vtkVideoFile> Video;
   std::unique_ptr<IgtlOutput> Igtl;
+  WindowRecorder Recorder;
   SessionSnapshot Now;
   ShownImage Shown;
-  ImageMode Mode = ImageMode::Plain;
-  std::size_t NextScreenshot = 0;
   QString Trouble_;
   bool Replaying = false;
-  bool ViewIsOurs = false; ///< the panel's values are being set to what devices made of the view
-  double Primary = 0.0;    ///< that the panel asked for, radians
-  double Secondary = 0.0;
   int DrawnFrames = 0;
-  double SceneFrameRate = 0.0;
   QElapsedTimer Second;
   QElapsedTimer Whole;
   std::uint64_t AllDrawn = 0;
-  QElapsedTimer VideoClock;
-  std::int64_t Filmed = 0; ///< places of the film that have passed
   QTimer Timer;
 
-  FluoroscopyWidget* Monitor = nullptr;
-  QVTKOpenGLNativeWidget* Anatomy = nullptr;
+  FluoroscopyWidget* Monitor = new FluoroscopyWidget;
+  QVTKOpenGLNativeWidget* Anatomy = new QVTKOpenGLNativeWidget;
   vtkNew<vtkGenericOpenGLRenderWindow> AnatomyWindow;
-  TraceWidget* Traces = nullptr;
-  QComboBox* WireChoice = nullptr;
-  QComboBox* CatheterChoice = nullptr;
-  QLabel* InstrumentText = nullptr;
-  QComboBox* ViewChoice = nullptr;
-  QDoubleSpinBox* PrimaryBox = nullptr;
-  QDoubleSpinBox* SecondaryBox = nullptr;
-  QDoubleSpinBox* DistanceBox = nullptr;
-  QDoubleSpinBox* TableBoxes[3] = { nullptr, nullptr, nullptr };
-  QPushButton* FluoroscopyButton = nullptr;
-  QCheckBox* FluoroscopyHold = nullptr;
-  QComboBox* FieldChoice = nullptr;
-  QComboBox* RateChoice = nullptr;
-  QComboBox* ModeChoice = nullptr;
-  QSlider* RunSlider = nullptr;
-  QSlider* FrameSlider = nullptr;
-  QDoubleSpinBox* InjectionBox = nullptr;
-  QLabel* ContrastText = nullptr;
-  QSlider* HeartSlider = nullptr;
-  QLabel* HeartText = nullptr;
-  QCheckBox* HeartPause = nullptr;
-  QLabel* MetricsText = nullptr;
-  QPlainTextEdit* Log = nullptr;
-  QLabel* DeviceText = nullptr;
+  TraceWidget* Traces = new TraceWidget;
+  MetricsPanel* Metrics = new MetricsPanel;
+  InstrumentPanel* Instruments = new InstrumentPanel;
+  ViewPanel* View = new ViewPanel;
+  XRayPanel* XRay = new XRayPanel;
+  ContrastPanel* Contrast = new ContrastPanel;
+  HeartPanel* Heart = new HeartPanel;
   QPushButton* ForceButton = nullptr;
+  QPlainTextEdit* Log = new QPlainTextEdit;
+  QLabel* DeviceText = new QLabel;
   QAction* PauseAction = nullptr;
-  QAction* VideoAction = nullptr;
 };
 }
 

@@ -4,35 +4,30 @@
 #include "DeviceUri.h"
 #include "HeadlessSession.h"
 #include "HeartShell.h"
-#include "InstrumentCatalogue.h"
 #include "Interruption.h"
 #include "Program.h"
 #include "RecordedDevices.h"
+#include "vtkAnatomyPanel.h"
 #include "vtkLoadingWindow.h"
 #include "vtkWindowProgram.h"
 
 #include "vtkRenderer.h"
 
-#include <QAction>
 #include <QApplication>
 #include <QCloseEvent>
-#include <QDateTime>
-#include <QDir>
 #include <QDockWidget>
-#include <QJsonArray>
-#include <QJsonDocument>
-#include <QJsonObject>
+#include <QFileDialog>
 #include <QKeyEvent>
-#include <QSaveFile>
-#include <QSignalBlocker>
+#include <QMessageBox>
+#include <QScrollArea>
 #include <QSplitter>
 #include <QStatusBar>
+#include <QToolBar>
 #include <QVBoxLayout>
 
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <initializer_list>
 #include <memory>
 #include <stdexcept>
 #include <utility>
@@ -41,54 +36,27 @@ namespace coronary
 {
 namespace
 {
-constexpr double Degree = 3.14159265358979323846 / 180.0;
-constexpr double WheelAdvance = 2.0;        // mm a notch
-constexpr double WheelTurn = 15.0 * Degree; // a notch
-constexpr double DragTurn = 0.3 * Degree;   // of the C-arm, a pixel
-constexpr int PollInterval = 15;            // ms
-constexpr double VideoRate = 10.0;          // Hz
+constexpr double WheelAdvance = 2.0;               // mm a notch
+constexpr double WheelTurn = 15.0 * DegreeOfHands; // a notch
+constexpr double DragTurn = 0.3;                   // degrees of the C-arm, a pixel
+constexpr int PollInterval = 15;                   // ms
 
 /// X11's name of a key, as the key map has it.
 std::string KeyName(const QKeyEvent& event)
 {
-  switch (event.key())
+  static constexpr std::pair<int, const char*> names[] = { { Qt::Key_Up, "Up" },
+    { Qt::Key_Down, "Down" }, { Qt::Key_Left, "Left" }, { Qt::Key_Right, "Right" },
+    { Qt::Key_Space, "space" }, { Qt::Key_Shift, "Shift_L" }, { Qt::Key_Control, "Control_L" },
+    { Qt::Key_PageUp, "Prior" }, { Qt::Key_PageDown, "Next" }, { Qt::Key_Home, "Home" },
+    { Qt::Key_End, "End" }, { Qt::Key_Return, "Return" }, { Qt::Key_Plus, "plus" },
+    { Qt::Key_Backspace, "BackSpace" }, { Qt::Key_Minus, "minus" }, { Qt::Key_Comma, "comma" },
+    { Qt::Key_Period, "period" } };
+  for (const auto& [key, name] : names)
   {
-    case Qt::Key_Up:
-      return "Up";
-    case Qt::Key_Down:
-      return "Down";
-    case Qt::Key_Left:
-      return "Left";
-    case Qt::Key_Right:
-      return "Right";
-    case Qt::Key_Space:
-      return "space";
-    case Qt::Key_Shift:
-      return "Shift_L";
-    case Qt::Key_Control:
-      return "Control_L";
-    case Qt::Key_PageUp:
-      return "Prior";
-    case Qt::Key_PageDown:
-      return "Next";
-    case Qt::Key_Home:
-      return "Home";
-    case Qt::Key_End:
-      return "End";
-    case Qt::Key_Return:
-      return "Return";
-    case Qt::Key_Plus:
-      return "plus";
-    case Qt::Key_Backspace:
-      return "BackSpace";
-    case Qt::Key_Minus:
-      return "minus";
-    case Qt::Key_Comma:
-      return "comma";
-    case Qt::Key_Period:
-      return "period";
-    default:
-      break;
+    if (event.key() == key)
+    {
+      return name;
+    }
   }
   if (event.key() >= Qt::Key_A && event.key() <= Qt::Key_Z)
   {
@@ -99,13 +67,6 @@ std::string KeyName(const QKeyEvent& event)
     return { static_cast<char>('0' + event.key() - Qt::Key_0) };
   }
   return {};
-}
-
-/// Without a minus before what is rounded to nothing.
-QString Decimal(double value, int digits)
-{
-  const double unit = std::pow(10.0, digits);
-  return QString::number(std::round(value * unit) / unit + 0.0, 'f', digits);
 }
 
 /// Whose arteries they are, as far as the folder tells.
@@ -128,6 +89,7 @@ SessionWindow::SessionWindow(
   : World(world)
   , Options(options)
   , Scene(std::move(scene))
+  , Recorder(*this, this->Options)
 {
   // For as long as the window is open: nobody should take this motion for the patient's.
   const std::string foreign = world.foreignMotion.empty() ? "" : " - " + world.foreignMotion;
@@ -143,38 +105,14 @@ SessionWindow::SessionWindow(
     this->Igtl = std::make_unique<IgtlOutput>(options.igtlPort, options.igtlAddress);
   }
 
-  this->Monitor = new FluoroscopyWidget;
-  this->Anatomy = new QVTKOpenGLNativeWidget;
-  this->Anatomy->setRenderWindow(this->AnatomyWindow);
-  this->Anatomy->setMinimumSize(256, 256);
-  this->AnatomyWindow->SetMultiSamples(0);
-  this->AnatomyWindow->AddRenderer(this->Scene->Renderer());
-  auto* views = new QSplitter(Qt::Horizontal);
-  views->addWidget(this->Monitor);
-  views->addWidget(this->Anatomy);
-  views->setSizes({ 1000, 1000 });
-  views->setChildrenCollapsible(false);
-  this->Traces = new TraceWidget;
-  auto* centre = new QWidget;
-  auto* column = new QVBoxLayout(centre);
-  column->setContentsMargins(0, 0, 0, 0);
-  column->setSpacing(2);
-  column->addWidget(views, 1);
-  auto* below = new QHBoxLayout;
-  below->setSpacing(0);
-  below->addWidget(this->Traces, 1);
-  below->addWidget(this->MakeMetrics());
-  column->addLayout(below);
-  this->setCentralWidget(centre);
-
+  this->setCentralWidget(this->MakeCentre());
   auto* dock = new QDockWidget("Panel");
   dock->setFeatures(QDockWidget::DockWidgetMovable | QDockWidget::DockWidgetFloatable);
-  dock->setWidget(this->MakePanel());
+  dock->setWidget(this->MakePanels());
   this->addDockWidget(Qt::RightDockWidgetArea, dock);
   this->MakeToolBar();
-  this->DeviceText = new QLabel;
   this->statusBar()->addPermanentWidget(this->DeviceText);
-  this->ConnectMouse();
+  this->ConnectPanels();
   this->ShowScenario();
   QObject::connect(&this->Timer, &QTimer::timeout, [this] { this->Poll(); });
   this->Timer.start(PollInterval);
@@ -187,43 +125,102 @@ SessionWindow::~SessionWindow()
   this->AnatomyWindow->RemoveRenderer(this->Scene->Renderer());
 }
 
-/// The panel says what the next session begins with.
-void SessionWindow::ShowScenario()
+QWidget* SessionWindow::MakeCentre()
 {
-  const Scenario& scenario = this->World.scenario;
-  const auto choose = [](QComboBox* box, const QString& text, const QVariant& value)
+  this->Anatomy->setRenderWindow(this->AnatomyWindow);
+  this->Anatomy->setMinimumSize(256, 256);
+  this->AnatomyWindow->SetMultiSamples(0);
+  this->AnatomyWindow->AddRenderer(this->Scene->Renderer());
+  auto* views = new QSplitter(Qt::Horizontal);
+  views->addWidget(this->Monitor);
+  views->addWidget(this->Anatomy);
+  views->setSizes({ 1000, 1000 });
+  views->setChildrenCollapsible(false);
+  auto* centre = new QWidget;
+  auto* column = new QVBoxLayout(centre);
+  column->setContentsMargins(0, 0, 0, 0);
+  column->setSpacing(2);
+  column->addWidget(views, 1);
+  auto* below = new QHBoxLayout;
+  below->setSpacing(0);
+  below->addWidget(this->Traces, 1);
+  below->addWidget(this->Metrics);
+  column->addLayout(below);
+  return centre;
+}
+
+QWidget* SessionWindow::MakePanels()
+{
+  auto* inside = new QWidget;
+  auto* column = new QVBoxLayout(inside);
+  column->setContentsMargins(6, 6, 6, 6);
+  auto* anatomy =
+    new AnatomyPanel(*this->Scene, this->Options.heart, [this] { return this->Now.pose; });
+  for (QWidget* panel : std::initializer_list<QWidget*>{
+         this->Instruments, this->View, this->XRay, this->Contrast, this->Heart, anatomy })
   {
-    if (box->findText(text) < 0)
-    {
-      box->addItem(text, value); // the scenario's own
-    }
-    box->setCurrentText(text);
-  };
-  choose(this->WireChoice, QString::fromStdString(scenario.wire.name), {});
-  choose(this->CatheterChoice, QString::fromStdString(scenario.catheter.name), {});
-  const ImagingSettings& imaging = scenario.imaging;
-  choose(this->RateChoice, QString("%1 frames/s").arg(imaging.frameRate), imaging.frameRate);
-  choose(this->FieldChoice, QString("%1 mm").arg(imaging.fieldOfView), imaging.fieldOfView);
-  const double heartRate = scenario.settings.heartRate;
-  const QSignalBlocker sliderSilence(this->HeartSlider);
-  const QSignalBlocker pauseSilence(this->HeartPause);
-  this->HeartPause->setChecked(heartRate <= 0.0);
-  if (heartRate > 0.0)
-  {
-    this->HeartSlider->setValue(static_cast<int>(std::lround(heartRate)));
+    column->addWidget(panel);
   }
-  this->HeartText->setText(
-    QString("%1 /min").arg(heartRate > 0.0 ? heartRate : this->HeartSlider->value()));
+  this->ForceButton =
+    PanelButton("Confirm forces", "Hands are on the device and ready to feel forces");
+  this->ForceButton->hide();
+  this->Log->setReadOnly(true);
+  this->Log->setMaximumBlockCount(500);
+  this->Log->setMinimumHeight(60);
+  this->Log->setFocusPolicy(Qt::ClickFocus);
+  column->addWidget(this->ForceButton);
+  column->addWidget(this->Log, 1);
+  auto* scroll = new QScrollArea;
+  scroll->setWidget(inside);
+  scroll->setWidgetResizable(true);
+  scroll->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
+  scroll->setMinimumWidth(inside->minimumSizeHint().width() + 24);
+  return scroll;
 }
 
-void SessionWindow::PressFluoroscopy()
+void SessionWindow::ConnectPanels()
 {
-  this->Panel->SetPedal(
-    FluoroscopyPedal, this->FluoroscopyButton->isDown() || this->FluoroscopyHold->isChecked());
-}
-
-void SessionWindow::ConnectMouse()
-{
+  this->Recorder.say = [this](const QString& text) { this->Log->appendPlainText(text); };
+  this->Recorder.fail = [this](const QString& text) { this->Problem(text); };
+  this->View->placed = [this](const ViewPlace& view)
+  {
+    if (this->Mux)
+    {
+      this->Mux->PlaceView(view);
+    }
+  };
+  this->XRay->pedalMoved = [this](std::uint32_t pedal, bool down)
+  {
+    if (this->Panel)
+    {
+      this->Panel->SetPedal(pedal, down);
+    }
+  };
+  this->XRay->chosen = [this](const RecordedEvent& event) { this->Chosen(event); };
+  this->XRay->modeChosen = [this](ImageMode mode)
+  {
+    if (this->Engine)
+    {
+      this->Engine->SetImageMode(mode);
+    }
+  };
+  this->XRay->frameChosen = [this] { this->ShowCine(); };
+  this->Contrast->injects = [this](double speed)
+  {
+    if (this->Panel)
+    {
+      this->Panel->SetInjection(speed);
+    }
+  };
+  this->Heart->chosen = [this](const RecordedEvent& event) { this->Chosen(event); };
+  QObject::connect(this->ForceButton, &QPushButton::clicked,
+    [this]
+    {
+      for (const std::shared_ptr<Device>& device : this->Hardware)
+      {
+        device->ConfirmForces();
+      }
+    });
   this->Monitor->wheelTurned = [this](double steps, Qt::KeyboardModifiers modifiers)
   {
     if ((modifiers & Qt::ShiftModifier) != 0)
@@ -240,31 +237,94 @@ void SessionWindow::ConnectMouse()
     }
   };
   this->Monitor->dragged = [this](QPoint moved)
-  {
-    this->Primary =
-      std::clamp(this->Primary + moved.x() * DragTurn, -105.0 * Degree, 105.0 * Degree);
-    this->Secondary =
-      std::clamp(this->Secondary + moved.y() * DragTurn, -50.0 * Degree, 50.0 * Degree);
-    this->PrimaryBox->setValue(this->Primary / Degree);
-    this->SecondaryBox->setValue(this->Secondary / Degree);
-  };
+  { this->View->Turn(moved.x() * DragTurn, moved.y() * DragTurn); };
 }
 
-void SessionWindow::PlaceView()
+void SessionWindow::MakeToolBar()
 {
-  if (this->ViewIsOurs || !this->Mux)
+  QToolBar* bar = this->addToolBar("Session");
+  bar->setMovable(false);
+  const auto add = [&](const QString& text, const QString& help, auto action)
   {
-    return;
-  }
-  ViewPlace view;
-  view.primary = this->PrimaryBox->value() * Degree;
-  view.secondary = this->SecondaryBox->value() * Degree;
-  view.sourceToDetector = this->DistanceBox->value();
-  for (int axis = 0; axis < 3; ++axis)
+    QAction* one = bar->addAction(text);
+    one->setToolTip(help);
+    QObject::connect(one, &QAction::triggered, action);
+    return one;
+  };
+  add("New session", "From the beginning, with the chosen instruments",
+    [this](bool) { this->Restart({}, {}); });
+  add("Record ...", "A new session that is recorded",
+    [this](bool)
+    {
+      const QString path = QFileDialog::getSaveFileName(
+        this, "Record a new session", "session.pcirec", "Recordings (*.pcirec)");
+      if (!path.isEmpty())
+      {
+        this->Restart(path.toStdString(), {});
+      }
+    });
+  add("Replay ...", "Goes through a recording",
+    [this](bool)
+    {
+      const QString path =
+        QFileDialog::getOpenFileName(this, "Replay", {}, "Recordings (*.pcirec)");
+      if (!path.isEmpty())
+      {
+        this->Restart({}, path.toStdString());
+      }
+    });
+  add("Stop", "Ends the session and finishes its recording", [this](bool) { this->End(); });
+  this->PauseAction = add("Pause", "Time stands still",
+    [this](bool on)
+    {
+      if (this->Engine)
+      {
+        this->Engine->SetPaused(on);
+      }
+    });
+  this->PauseAction->setCheckable(true);
+  bar->addSeparator();
+  add("Screenshot", "Saves a picture of the window in the current folder",
+    [this](bool) { this->Recorder.SaveScreenshot(); });
+  this->Recorder.filming =
+    add("Video", "Films the window into a file", [this](bool on) { this->Recorder.Film(on); });
+  this->Recorder.filming->setCheckable(true);
+  bar->addSeparator();
+  add("Help", "Keys and mouse", [this](bool) { this->ShowKeys(); });
+}
+
+void SessionWindow::ShowKeys()
+{
+  QString text = "<table>";
+  for (const KeyBinding& binding : KeyboardDevice::KeyMap())
   {
-    view.table[axis] = this->TableBoxes[axis]->value();
+    text += QString("<tr><td><b>%1</b>&nbsp;&nbsp;</td><td>%2</td></tr>")
+              .arg(QString(binding.key).toHtmlEscaped(), QString(binding.meaning).toHtmlEscaped());
   }
-  this->Mux->PlaceView(view);
+  text += "</table><p>Wheel on the X-ray image: the wire forth and back; with Shift it turns; "
+          "with Control the catheter. Right button drags the C-arm.</p>";
+  QMessageBox::information(this, "Keys and mouse", text);
+}
+
+/// The panels say what the next session begins with.
+void SessionWindow::ShowScenario()
+{
+  this->Instruments->ShowScenario(this->World.scenario);
+  this->XRay->ShowScenario(this->World.scenario.imaging);
+  this->Heart->ShowRate(this->World.scenario.settings.heartRate);
+}
+
+/// For this session, if there is one, and for the next ones.
+void SessionWindow::Chosen(const RecordedEvent& event)
+{
+  Scenario& scenario = this->World.scenario;
+  (event.kind == RecordedEvent::HeartRate      ? scenario.settings.heartRate
+      : event.kind == RecordedEvent::FrameRate ? scenario.imaging.frameRate
+                                               : scenario.imaging.fieldOfView) = event.value;
+  if (this->Engine)
+  {
+    this->Engine->Post(event);
+  }
 }
 
 void SessionWindow::Begin(const std::string& record, const std::string& replay)
@@ -272,22 +332,13 @@ void SessionWindow::Begin(const std::string& record, const std::string& replay)
   Scenario& scenario = this->World.scenario;
   if (replay.empty())
   {
-    const auto wire = this->WireChoice->currentText().toStdString();
-    const auto catheter = this->CatheterChoice->currentText().toStdString();
-    if (wire != scenario.wire.name)
-    {
-      scenario.wire = BuiltInCatalogue().Wire(wire).wire;
-    }
-    if (catheter != scenario.catheter.name)
-    {
-      scenario.catheter = BuiltInCatalogue().Catheter(catheter).catheter;
-    }
+    this->Instruments->Take(scenario);
   }
   this->Engine.reset();
   this->Keys = std::make_shared<KeyboardDevice>();
   this->Panel = std::make_shared<PanelDevice>();
   this->Mux = std::make_shared<DeviceMux>();
-  this->PressFluoroscopy();
+  this->XRay->PressFluoroscopy();
   const CArmPose& pose = scenario.imaging.pose;
   EngineOptions options;
   if (!this->Options.script.empty())
@@ -309,7 +360,7 @@ void SessionWindow::Begin(const std::string& record, const std::string& replay)
   this->Engine =
     std::make_unique<SessionEngine>(this->World, replay.empty() ? this->Mux : nullptr, options);
   this->Replaying = !replay.empty();
-  this->Engine->SetImageMode(this->Mode);
+  this->Engine->SetImageMode(this->XRay->Mode());
   this->Traces->Clear();
   this->PauseAction->setChecked(false);
   this->Engine->Start();
@@ -348,17 +399,9 @@ void SessionWindow::Restart(const std::string& record, const std::string& replay
   }
 }
 
-void SessionWindow::Post(const RecordedEvent& event)
-{
-  if (this->Engine)
-  {
-    this->Engine->Post(event);
-  }
-}
-
 void SessionWindow::End()
 {
-  this->ToggleVideo(false);
+  this->Recorder.Film(false);
   if (!this->Engine)
   {
     return;
@@ -419,8 +462,7 @@ void SessionWindow::ShowSession()
     this->Log->appendPlainText(QString::fromStdString(message));
   }
   this->ShowRates();
-  this->TakeDueScreenshots();
-  this->RecordVideo();
+  this->Recorder.Update(this->Now, this->Shown);
   const bool timeIsUp =
     this->Options.quitAfter > 0.0 && this->Now.seconds >= this->Options.quitAfter;
   if (this->Engine->IsOver() || timeIsUp)
@@ -449,9 +491,13 @@ void SessionWindow::ShowScene()
   ++this->DrawnFrames;
   ++this->AllDrawn;
   this->Traces->Add(this->Now);
-  this->ShowNumbers(this->Now);
+  const WallTopology& topology = this->World.wall->Topology();
+  this->Instruments->ShowReport(this->Now.report, topology);
+  this->Contrast->ShowBalance(this->Now.contrast);
+  this->Metrics->ShowMetrics(this->Now.metrics, topology);
+  this->View->Follow(this->Now.pose, this->Now.input.table);
   this->ShowDevices();
-  this->Monitor->SetState(this->Now, this->Shown.completeness, this->Mode);
+  this->Monitor->SetState(this->Now, this->Shown.completeness, this->XRay->Mode());
 }
 
 /// The wire's tip for others: its last axis is the way forward.
@@ -485,82 +531,6 @@ void SessionWindow::ShowImage()
   }
 }
 
-void SessionWindow::ShowNumbers(const SessionSnapshot& now)
-{
-  const TickReport& report = now.report;
-  const auto& names = this->World.wall->Topology().groupName;
-  const auto nameOf = [&](int branch)
-  {
-    const auto n = static_cast<std::size_t>(branch);
-    return branch < 0                         ? QString("catheter")
-      : n < names.size() && !names[n].empty() ? QString::fromStdString(names[n])
-                                              : QString::number(branch);
-  };
-  this->InstrumentText->setText(
-    QString("Beyond the catheter  %1 mm, in %2\nCatheter beyond ostium  %3 mm\n"
-            "Hand  %4 N, %5 N mm    Tip  %6 N")
-      .arg(Decimal(report.inserted, 1), nameOf(report.branch), Decimal(report.catheterTip, 1),
-        Decimal(report.proximalForce, 2), Decimal(report.proximalTorque, 2),
-        Decimal(report.tipForce, 2)));
-  this->ContrastText->setText(
-    QString("%1 mL injected, %2 mL in the arteries,\n%3 mL in the myocardium, %4 mL spilled")
-      .arg(now.contrast.injected, 0, 'f', 1)
-      .arg(now.contrast.inTree, 0, 'f', 2)
-      .arg(now.contrast.blush, 0, 'f', 2)
-      .arg(now.contrast.spilled, 0, 'f', 2));
-  const SessionMetrics& metrics = now.metrics;
-  QString branches;
-  QString last;
-  for (const int branch : metrics.branches)
-  {
-    const QString name = nameOf(branch);
-    branches += name == last ? QString() : (branches.isEmpty() ? "" : ", ") + name;
-    last = name;
-  }
-  this->MetricsText->setText(
-    QString("Time  %1 s    Fluoroscopy  %2 s (cine %3 s)\nDose  %4 mGy, %5 Gy cm%6, %7 frames\n"
-            "Contrast  %8 mL    Greatest wall force  %9 N\n")
-      .arg(metrics.procedureSeconds, 0, 'f', 0)
-      .arg(metrics.fluoroscopySeconds, 0, 'f', 1)
-      .arg(metrics.cineSeconds, 0, 'f', 1)
-      .arg(metrics.airKerma, 0, 'f', 1)
-      .arg(metrics.doseAreaProduct, 0, 'f', 2)
-      .arg(QChar(0x00B2))
-      .arg(metrics.frames)
-      .arg(metrics.contrast, 0, 'f', 1)
-      .arg(metrics.maximumWallForce, 0, 'f', 2) +
-    QString("Wire moved  %1 mm, turned %2, deepest %3 mm\nPath  %4")
-      .arg(metrics.wireTravel, 0, 'f', 0)
-      .arg(QString::number(metrics.wireTurning / (2.0 * M_PI), 'f', 1) + " turns")
-      .arg(metrics.deepest, 0, 'f', 0)
-      .arg(branches));
-  // The panel follows what devices make of the view, but not while somebody types into it.
-  this->ViewIsOurs = true;
-  const auto follow = [](QDoubleSpinBox* box, double value)
-  {
-    if (!box->hasFocus() && std::abs(box->value() - value) >= 0.5)
-    {
-      box->setValue(value);
-    }
-  };
-  follow(this->PrimaryBox, now.pose.primary / Degree);
-  follow(this->SecondaryBox, now.pose.secondary / Degree);
-  follow(this->DistanceBox, now.pose.sourceToDetector);
-  for (int axis = 0; axis < 3; ++axis)
-  {
-    follow(this->TableBoxes[axis], now.input.table[axis]);
-  }
-  this->ViewIsOurs = false;
-  if (std::abs(this->Primary - now.pose.primary) > 2.0 * Degree)
-  {
-    this->Primary = now.pose.primary;
-  }
-  if (std::abs(this->Secondary - now.pose.secondary) > 2.0 * Degree)
-  {
-    this->Secondary = now.pose.secondary;
-  }
-}
-
 void SessionWindow::ShowDevices()
 {
   QString banner = QString::fromStdString(this->World.foreignMotion);
@@ -585,7 +555,7 @@ void SessionWindow::ShowRates()
   {
     return;
   }
-  this->SceneFrameRate = 1000.0 * this->DrawnFrames / static_cast<double>(this->Second.restart());
+  const double drawn = 1000.0 * this->DrawnFrames / static_cast<double>(this->Second.restart());
   this->DrawnFrames = 0;
   const EngineRates rates = this->Engine->Rates();
   this->DeviceText->setText(
@@ -597,15 +567,13 @@ void SessionWindow::ShowRates()
       .arg(rates.images, 0, 'f', 1)
       .arg(rates.imageMilliseconds, 0, 'f', 1)
       .arg(rates.lateImages)
-      .arg(this->SceneFrameRate, 0, 'f', 1)
+      .arg(drawn, 0, 'f', 1)
       .arg(this->Scene->NumberOfTriangles()));
   std::size_t runs = 0;
   std::size_t frames = 0;
   GreyImage unused;
   this->Engine->CineFrame(0, SIZE_MAX, unused, runs, frames);
-  this->RunSlider->setEnabled(runs > 0);
-  this->FrameSlider->setEnabled(runs > 0);
-  this->RunSlider->setMaximum(runs > 0 ? static_cast<int>(runs) - 1 : 0);
+  this->XRay->SetRuns(runs);
 }
 
 /// Over the whole session, for whoever runs it unattended.
@@ -634,134 +602,16 @@ void SessionWindow::ShowCine()
   std::size_t runs = 0;
   std::size_t frames = 0;
   GreyImage image;
-  const auto run = static_cast<std::size_t>(this->RunSlider->value());
+  const std::size_t run = this->XRay->Run();
   this->Engine->CineFrame(run, SIZE_MAX, image, runs, frames);
-  this->FrameSlider->setMaximum(frames > 0 ? static_cast<int>(frames) - 1 : 0);
-  const auto frame = static_cast<std::size_t>(this->FrameSlider->value());
+  this->XRay->SetFrames(frames);
+  const std::size_t frame = this->XRay->Frame();
   if (this->Engine->CineFrame(run, frame, image, runs, frames))
   {
     this->Monitor->SetImage(image);
     this->Monitor->SetRunText(
       QString("RUN %1/%2  FRAME %3/%4").arg(run + 1).arg(runs).arg(frame + 1).arg(frames));
   }
-}
-
-void SessionWindow::TakeDueScreenshots()
-{
-  while (this->NextScreenshot < this->Options.screenshotSeconds.size() &&
-    this->Now.seconds >= this->Options.screenshotSeconds[this->NextScreenshot])
-  {
-    const QDir folder(QString::fromStdString(this->Options.screenshots));
-    const QString at =
-      QString("%1s").arg(this->Options.screenshotSeconds[this->NextScreenshot], 6, 'f', 2, '0');
-    this->SaveScreenshot(folder.filePath("window_" + at + ".png"));
-    this->SaveXRay(folder.filePath("xray_" + at));
-    ++this->NextScreenshot;
-  }
-}
-
-/// Whole or not at all.
-bool SavePicture(const QImage& picture, const QString& path)
-{
-  QSaveFile file(path);
-  return file.open(QIODevice::WriteOnly) && picture.save(&file, "PNG") && file.commit();
-}
-
-void SessionWindow::SaveScreenshot(const QString& path)
-{
-  if (!SavePicture(this->grab().toImage(), path))
-  {
-    this->Problem("Cannot write '" + path + "'.");
-    return;
-  }
-  this->Log->appendPlainText("Saved " + path);
-}
-
-/// The last X-ray image, and what was exposed.
-void SessionWindow::SaveXRay(const QString& name)
-{
-  const GreyImage& image = this->Shown.image;
-  if (image.values.empty())
-  {
-    return;
-  }
-  const SessionSnapshot& moment = this->Shown.moment;
-  const QJsonObject about{ { "tick", static_cast<double>(moment.tick) },
-    { "seconds", moment.seconds }, { "phase", moment.report.phase },
-    { "primary_deg", moment.pose.primary / Degree },
-    { "secondary_deg", moment.pose.secondary / Degree },
-    { "source_to_detector_mm", moment.pose.sourceToDetector },
-    { "source_to_isocentre_mm", moment.pose.sourceToIsocentre },
-    { "isocentre_mm",
-      QJsonArray{
-        moment.pose.isocentre.x(), moment.pose.isocentre.y(), moment.pose.isocentre.z() } },
-    { "field_of_view_mm", moment.fieldOfView }, { "background", this->Shown.completeness },
-    { "injected_mL", moment.contrast.injected }, { "in_tree_mL", moment.contrast.inTree },
-    { "inserted_mm", moment.report.inserted }, { "branch", moment.report.branch } };
-  const QImage picture(
-    image.values.data(), image.columns, image.rows, image.columns, QImage::Format_Grayscale8);
-  QSaveFile text(name + ".json");
-  const QByteArray bytes = QJsonDocument(about).toJson();
-  const bool written = text.open(QIODevice::WriteOnly) && text.write(bytes) == bytes.size() &&
-    text.commit() && SavePicture(picture, name + ".png");
-  if (!written)
-  {
-    this->Problem("Cannot write '" + name + ".json' and its picture.");
-  }
-}
-
-void SessionWindow::ToggleVideo(bool on)
-{
-  if (!on)
-  {
-    if (this->Video)
-    {
-      try
-      {
-        this->Video->Finish();
-      }
-      catch (const std::exception& error)
-      {
-        this->Problem(error.what());
-      }
-      this->Video.reset();
-    }
-    this->VideoAction->setChecked(false);
-    return;
-  }
-  const QString path = this->Options.video.empty()
-    ? "simulator-" + QDateTime::currentDateTime().toString("yyyyMMdd-HHmmss") + ".ogv"
-    : QString::fromStdString(this->Options.video);
-  try
-  {
-    this->Video = std::make_unique<vtkVideoFile>(path.toStdString(), VideoRate);
-    this->VideoClock.start();
-    this->Filmed = 0;
-    this->VideoAction->setChecked(true);
-    this->Log->appendPlainText("Filming into " + path);
-  }
-  catch (const std::exception& error)
-  {
-    this->Problem(error.what());
-  }
-}
-
-void SessionWindow::RecordVideo()
-{
-  if (!this->Options.video.empty() && !this->Video && this->Now.tick > 0 &&
-    !this->VideoClock.isValid())
-  {
-    this->ToggleVideo(true);
-  }
-  const double seconds = 1e-3 * static_cast<double>(this->VideoClock.elapsed());
-  if (!this->Video || seconds * VideoRate < static_cast<double>(this->Filmed))
-  {
-    return;
-  }
-  this->Filmed = static_cast<std::int64_t>(seconds * VideoRate) + 1;
-  const QImage picture = this->grab().toImage().convertToFormat(QImage::Format_RGB888);
-  this->Video->Add(picture.constBits(), picture.width(), picture.height(),
-    static_cast<std::size_t>(picture.bytesPerLine()), seconds);
 }
 
 void SessionWindow::keyPressEvent(QKeyEvent* event)
