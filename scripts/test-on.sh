@@ -22,6 +22,8 @@ EOF
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 # shellcheck source=scripts/build-first.bash
 source "$root/scripts/build-first.bash"
+# shellcheck source=scripts/pristine-system.bash
+source "$root/scripts/pristine-system.bash"
 suite=""
 demo=yes
 tests=yes
@@ -49,8 +51,7 @@ while [ $# -gt 0 ]; do
   shift "$taken"
 done
 case "$suite" in
-  bookworm | trixie | sid) mirror="${DYNAMICCORONARY_MIRROR:-http://deb.debian.org/debian}" ;;
-  noble) mirror="${DYNAMICCORONARY_MIRROR:-http://archive.ubuntu.com/ubuntu}" ;;
+  bookworm | trixie | sid | noble) ;;
   "")
     usage >&2
     exit 2
@@ -60,42 +61,12 @@ case "$suite" in
     exit 2
     ;;
 esac
-if [ "$(id -u)" -ne 0 ]; then
-  echo "test-on: run me as root: a system of its own is entered by chroot" >&2
-  exit 1
-fi
-if ! command -v debootstrap >/dev/null; then
-  echo "test-on: debootstrap is missing (apt-get install debootstrap)" >&2
-  exit 1
-fi
+require_debootstrap
 
-cache="${XDG_CACHE_HOME:-${HOME:-/root}/.cache}/dynamiccoronary/systems"
-base="$cache/$suite"
-mkdir -p "$cache" "$root/build/logs"
+mkdir -p "$root/build/logs"
 log="$root/build/logs/test-on-$suite.log"
 : >"$log"
-
-if [ ! -d "$base" ]; then
-  echo "== A base system of $suite, once (log: build/logs/test-on-$suite.log)"
-  made="$(mktemp -d "$cache/$suite.XXXXXX")"
-  trap 'rm -rf "$made"' EXIT
-  options=("--variant=minbase" "--include=git,ca-certificates")
-  if [ "$suite" = noble ]; then
-    options+=("--components=main,universe")
-    # Debian has no key of Ubuntu's archive unless ubuntu-keyring is installed.
-    [ -f /usr/share/keyrings/ubuntu-archive-keyring.gpg ] || options+=(--no-check-gpg)
-  fi
-  if ! debootstrap "${options[@]}" "$suite" "$made/root" "$mirror" >>"$log" 2>&1; then
-    tail -n 20 "$log" >&2
-    echo "test-on: debootstrap could not make a system of $suite" >&2
-    exit 1
-  fi
-  mv -T "$made/root" "$base"
-  rmdir "$made"
-  trap - EXIT
-fi
-
-system="$(mktemp -d "$cache/$suite-run.XXXXXX")"
+pristine_system "$suite" "$log"
 finish() {
   if [ "$keep" = yes ]; then
     echo "The system is left in $system"
@@ -104,8 +75,6 @@ finish() {
   fi
 }
 trap finish EXIT
-cp -a "$base/." "$system"
-cp -L /etc/resolv.conf "$system/etc/resolv.conf"
 place=/home/dynamiccoronary
 git clone -q "$root" "$system$place"
 commit="$(git -C "$system$place" rev-parse --short HEAD)"
@@ -117,36 +86,20 @@ fi
 if [ "$tests" = yes ]; then
   commands+=("scripts/test.sh ${of_tests[*]} -j $jobs")
 fi
-# The mounts are in a name space of their own: they are gone with its last process, whatever happens.
-# shellcheck disable=SC2016 # for the shell inside
-inside='
-set -eu
-system=$1 place=$2 kept=$3
-mount -t proc proc "$system/proc"
-mount --rbind /dev "$system/dev"
-mount --rbind /sys "$system/sys"
-if [ -d "$4" ]; then
-  mkdir -p "$system/home/shared"
-  mount --bind "$4" "$system/home/shared"
+mounts=()
+if [ -d "$root/../shared" ]; then
+  mounts+=("$root/../shared=/home/shared")
 fi
-if [ -n "$kept" ]; then
-  mkdir -p "$kept" "$system/root/.cache/ccache"
-  mount --bind "$kept" "$system/root/.cache/ccache"
-fi
-exec chroot "$system" env -i HOME=/root PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 \
-  sh -c "cd $place && $5"
-'
-kept=""
 if [ "$compiler_cache" = yes ]; then
-  kept="$cache/$suite-ccache"
+  mkdir -p "$systems/$suite-ccache"
+  mounts+=("$systems/$suite-ccache=/root/.cache/ccache")
 fi
-echo "== $suite, commit $commit: $(sed -n 's/^PRETTY_NAME="\(.*\)"/\1/p' "$base/etc/os-release")"
+echo "== $suite, commit $commit: $(sed -n 's/^PRETTY_NAME="\(.*\)"/\1/p' "$system/etc/os-release")"
 failed=()
 for command in "${commands[@]}"; do
   begun="$SECONDS"
   echo "== $command" | tee -a "$log"
-  unshare --mount --pid --fork --kill-child sh -c "$inside" test-on "$system" "$place" "$kept" "$root/../shared" "$command" \
-    </dev/null 2>&1 | tee -a "$log" || failed+=("${command%% *}")
+  in_system "cd $place && $command" ${mounts[@]+"${mounts[@]}"} 2>&1 | tee -a "$log" || failed+=("${command%% *}")
   passed=$((SECONDS - begun))
   printf '== %s: %d:%02d min\n' "${command%% *}" $((passed / 60)) $((passed % 60)) | tee -a "$log"
 done

@@ -3,35 +3,25 @@
 # plugin by itself, the programs must run; removed, it must leave nothing behind. Needs root and debootstrap.
 set -euo pipefail
 
-if [ $# -lt 1 ] || [ $# -gt 3 ] || [ ! -f "$1" ] || ! [[ ${2:-bookworm} =~ ^(bookworm|trixie|sid)$ ]]; then
-  echo "Usage: scripts/test-package.sh PACKAGE.deb [bookworm|trixie|sid [FOLDER]]   (FOLDER, where the system is made: default mktemp -d)" >&2
+root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
+# shellcheck source=scripts/pristine-system.bash
+source "$root/scripts/pristine-system.bash"
+if [ $# -lt 1 ] || [ $# -gt 2 ] || [ ! -f "$1" ] || ! [[ ${2:-bookworm} =~ ^(bookworm|trixie|sid)$ ]]; then
+  echo "Usage: scripts/test-package.sh PACKAGE.deb [bookworm|trixie|sid]" >&2
   exit 2
 fi
-if [ "$(id -u)" -ne 0 ] || ! command -v debootstrap >/dev/null; then
-  echo "test-package: run me as root, with debootstrap installed" >&2
-  exit 1
-fi
+require_debootstrap
 package="$(realpath "$1")"
 suite="${2:-bookworm}"
-system="$(realpath "${3:-$(mktemp -d)}")"
-mirror="${DYNAMICCORONARY_MIRROR:-http://deb.debian.org/debian}"
 icons=qt6-svg-plugins
 if [ "$suite" = bookworm ]; then
   icons=libqt5svg5
 fi
 
-# Its mounts are seen by this process and its children only.
-if [ -z "${DYNAMICCORONARY_OWN_MOUNTS:-}" ]; then
-  DYNAMICCORONARY_OWN_MOUNTS=yes exec unshare --mount -- "$0" "$package" "$suite" "$system"
-fi
-if [ ! -e "$system/usr/bin/dpkg" ]; then
-  echo "== A new $suite in $system"
-  debootstrap --variant=minbase --include=ca-certificates "$suite" "$system" "$mirror" >"$system.log" 2>&1
-fi
-cp /etc/resolv.conf "$system/etc/resolv.conf"
+mkdir -p "$root/build/logs"
+pristine_system "$suite" "$root/build/logs/test-package-$suite.log"
+trap 'rm -rf "$system"' EXIT
 cp "$package" "$system/root/package.deb"
-mount -t proc proc "$system/proc"
-mount --rbind /dev "$system/dev"
 
 cat >"$system/root/use.sh" <<'EOF'
 set -eu
@@ -79,4 +69,4 @@ if [ -e /usr/bin/paraview.conf ] || grep -i coronary /usr/lib/*/paraview-*/parav
 fi
 echo "== Removed without a trace"
 EOF
-chroot "$system" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 bash /root/use.sh "$icons"
+in_system "bash /root/use.sh $icons"
