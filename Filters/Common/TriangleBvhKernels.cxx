@@ -14,7 +14,7 @@ namespace coronary
 {
 namespace
 {
-using Floats = float __attribute__((vector_size(sizeof(float) * BvhWidth)));
+using Floats = float __attribute__((vector_size(sizeof(float) * BoxNode::Width)));
 using Doubles = double __attribute__((vector_size(sizeof(double) * BvhLeafSize)));
 
 // Never more than seven siblings wait on each of the at most eleven levels above a leaf.
@@ -26,7 +26,7 @@ constexpr float Slack = 1.0F + 2e-6F;
 struct Waiting
 {
   float distance;
-  std::int32_t child;
+  std::int32_t place;
 };
 
 /// Of the four triangles of a leaf.
@@ -123,14 +123,14 @@ void Closest(BvhQuery& query)
   std::int32_t current = 0;
   for (;;)
   {
-    if (current < 0)
+    if (current >= query.firstLeaf)
     {
-      VisitLeaf(query, query.leaves[~current]);
+      VisitLeaf(query, query.leaves[current - query.firstLeaf]);
       bound = toFloat(query.squaredDistance);
     }
     else
     {
-      const BvhNode& node = query.nodes[current];
+      const BoxNode& node = query.nodes[current];
       Floats squared = Floats{} + 0.0F;
       for (int k = 0; k < 3; ++k)
       {
@@ -145,14 +145,14 @@ void Closest(BvhQuery& query)
         outside = outside > zero ? outside : zero;
         squared += outside * outside;
       }
-      alignas(32) float distance[BvhWidth];
+      alignas(32) float distance[BoxNode::Width];
       std::memcpy(distance, &squared, sizeof(squared));
       // Nearest on top of the stack.
       const int base = waiting;
       const auto push = [&](int lane)
       {
         int place = waiting++;
-        const Waiting entry{ distance[lane], node.child[lane] };
+        const Waiting entry{ distance[lane], BoxNode::Width * current + 1 + lane };
         while (place > base && stack[place - 1].distance < entry.distance)
         {
           stack[place] = stack[place - 1];
@@ -168,7 +168,7 @@ void Closest(BvhQuery& query)
         push(__builtin_ctz(near));
       }
 #else
-      for (int lane = 0; lane < BvhWidth; ++lane)
+      for (int lane = 0; lane < BoxNode::Width; ++lane)
       {
         if (distance[lane] <= bound)
         {
@@ -185,7 +185,7 @@ void Closest(BvhQuery& query)
       }
       --waiting;
     } while (stack[waiting].distance > bound);
-    current = stack[waiting].child;
+    current = stack[waiting].place;
   }
 }
 }

@@ -2,6 +2,8 @@
 #ifndef DynamicCoronary_TriangleBvhKernels_h
 #define DynamicCoronary_TriangleBvhKernels_h
 
+#include "BoxNode.h"
+
 #include <cstdint>
 
 namespace coronary
@@ -9,17 +11,7 @@ namespace coronary
 template <typename Kernels>
 class KernelChoice;
 
-constexpr int BvhWidth = 8;
 constexpr int BvhLeafSize = 4;
-
-/// Boxes of the children, relative to the tree's centre. A missing child's box is empty.
-struct alignas(64) BvhNode
-{
-  float low[3][BvhWidth];
-  float high[3][BvhWidth];
-  std::int32_t child[BvhWidth]; ///< node, or ~leaf
-  std::int32_t unused[BvhWidth];
-};
 
 /// Corner a and edges b - a, c - a; a leaf that is not full has its last triangle several times.
 struct alignas(64) BvhLeaf
@@ -32,8 +24,9 @@ struct alignas(64) BvhLeaf
 
 struct BvhQuery
 {
-  const BvhNode* nodes;
+  const BoxNode* nodes;
   const BvhLeaf* leaves;
+  std::int32_t firstLeaf; ///< its place in the tree
   double point[3];
   float low[3]; ///< the point relative to the tree's centre, rounded down and up
   float high[3];

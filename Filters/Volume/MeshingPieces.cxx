@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <memory>
 
 namespace coronary
 {
@@ -36,8 +37,8 @@ std::int64_t InsertIntoSurface(
   {
     const Triangle& t = piece.triangles[i];
     const double distance =
-      (ClosestPointOfTriangle(p, piece.points[t[0]], piece.points[t[1]], piece.points[t[2]]) - p)
-        .squaredNorm();
+      NearestOnTriangle(p, piece.points[t[0]], piece.points[t[1]], piece.points[t[2]])
+        .squaredDistance;
     if (distance < best)
     {
       best = distance;
@@ -193,7 +194,7 @@ LocalRadius::LocalRadius(const TetrahedralMeshInput& input, const ClosedSurface&
       this->Segments.push_back({ point, point, point });
     }
   }
-  this->Tree = std::make_unique<TriangleTree>(this->Points, this->Segments);
+  this->Tree = TriangleBvh(this->Points, this->Segments);
   double volume = 0.0;
   double area = 0.0;
   for (const double v : surface.volume)
@@ -210,7 +211,7 @@ LocalRadius::LocalRadius(const TetrahedralMeshInput& input, const ClosedSurface&
 
 double LocalRadius::At(const Vector3& p) const
 {
-  const TriangleTree::Nearest nearest = this->Tree->Closest(p);
+  const TriangleBvh::Nearest nearest = this->Tree.Closest(p);
   if (nearest.triangle < 0)
   {
     return this->Mean;
@@ -294,13 +295,13 @@ private:
     const std::size_t count = this->Made.pieces.size();
     for (const MeshingPiece& piece : this->Made.pieces)
     {
-      this->Trees.push_back(std::make_unique<TriangleTree>(piece.points, piece.triangles));
+      this->Trees.emplace_back(piece.points, piece.triangles);
     }
     for (std::size_t i = 0; i < count; ++i)
     {
       for (std::size_t j = 0; j < count; ++j)
       {
-        if (i != j && this->Trees[j]->Winding(this->Made.pieces[i].points[0]) != 0)
+        if (i != j && this->Trees[j].Winding(this->Made.pieces[i].points[0]) != 0)
         {
           const std::int64_t cell = this->Made.pieces[i].sourceCell[0];
           throw SurfaceError("a part of the surface lies inside another one: that with " +
@@ -343,10 +344,10 @@ private:
       }
       const Vector3 p = points[i] - this->Made.origin;
       const double radius = this->RadiusAt(i);
-      TriangleTree::Nearest nearest;
+      TriangleBvh::Nearest nearest;
       for (std::size_t k = 0; k < this->Trees.size(); ++k)
       {
-        const TriangleTree::Nearest found = this->Trees[k]->Closest(p);
+        const TriangleBvh::Nearest found = this->Trees[k].Closest(p);
         if (nearest.triangle < 0 || found.distance < nearest.distance)
         {
           nearest = found;
@@ -369,7 +370,7 @@ private:
       this->Places[i].piece = -1;
       for (std::size_t k = 0; k < this->Trees.size(); ++k)
       {
-        if (this->Trees[k]->Winding(p) != 0)
+        if (this->Trees[k].Winding(p) != 0)
         {
           this->Places[i].piece = static_cast<int>(k);
         }
@@ -444,7 +445,7 @@ private:
   {
     for (std::size_t k = 0; k < this->Made.pieces.size(); ++k)
     {
-      this->SetSizes(this->Made.pieces[k], *this->Trees[k]);
+      this->SetSizes(this->Made.pieces[k], this->Trees[k]);
     }
   }
 
@@ -547,7 +548,7 @@ private:
   }
 
   /// Wanted edge lengths: the wall's own, and inside by the radius, but not finer than the wall.
-  void SetSizes(MeshingPiece& piece, const TriangleTree& tree) const
+  void SetSizes(MeshingPiece& piece, const TriangleBvh& tree) const
   {
     const std::vector<double> wall = WallSizes(piece);
     const double factor = this->Settings.sizeFactor;
@@ -570,10 +571,10 @@ private:
     const Vector3& p = piece.points[from];
     const Vector3& q = piece.points[to];
     bool crosses = false;
-    std::unique_ptr<TriangleTree>& tree = this->WallTrees[number];
+    std::unique_ptr<TriangleBvh>& tree = this->WallTrees[number];
     if (!tree)
     {
-      tree = std::make_unique<TriangleTree>(piece.points, piece.triangles);
+      tree = std::make_unique<TriangleBvh>(piece.points, piece.triangles);
     }
     tree->Visit(p.cwiseMin(q), p.cwiseMax(q),
       [&](std::int64_t triangle)
@@ -617,8 +618,8 @@ private:
   const ClosedSurface& Surface;
   const LocalRadius& Radii;
   MeshingPieces Made;
-  std::vector<std::unique_ptr<TriangleTree>> Trees; ///< of the pieces as the surface has them
-  std::vector<std::unique_ptr<TriangleTree>>
+  std::vector<TriangleBvh> Trees; ///< of the pieces as the surface has them
+  std::vector<std::unique_ptr<TriangleBvh>>
     WallTrees;               ///< with the points that were put on the wall
   std::vector<Place> Places; ///< of each skeleton point
   std::vector<std::pair<std::size_t, Vector3>> OnWall; ///< skeleton points and where they go

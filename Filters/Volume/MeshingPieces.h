@@ -3,9 +3,7 @@
 #define DynamicCoronary_MeshingPieces_h
 
 #include "TetrahedralMesh.h"
-#include "TriangleTree.h"
-
-#include <memory>
+#include "TriangleBvh.h"
 
 namespace coronary
 {
@@ -22,7 +20,7 @@ private:
   const std::vector<Vector3>& Points;
   const std::vector<double>& Radius;
   std::vector<Triangle> Segments;
-  std::unique_ptr<TriangleTree> Tree;
+  TriangleBvh Tree;
   double Mean = 0.0;
 };
 

@@ -5,8 +5,8 @@
 #include "SurfaceCheck.h"
 #include "SurfaceRims.h"
 #include "ThinTriangles.h"
+#include "TriangleBvh.h"
 #include "TriangleIntersections.h"
-#include "TriangleTree.h"
 
 #include <algorithm>
 #include <cmath>
@@ -956,7 +956,7 @@ private:
           (this->Surface.points[i] - this->InputPoints[this->Surface.source[i]]).norm());
       }
     }
-    const TriangleTree tree(this->InputPoints, this->InputTriangles);
+    const TriangleBvh tree(this->InputPoints, this->InputTriangles);
     result.nearestPoint = result.sourcePoint;
     for (std::size_t i = 0; i < result.points.size(); ++i)
     {

@@ -703,7 +703,7 @@ private:
   {
     const bool keepsSurface = this->Mesh.backend == TetrahedralBackend::TetGen;
     std::map<Triangle, std::int64_t> source;
-    std::unique_ptr<TriangleTree> tree;
+    std::unique_ptr<TriangleBvh> tree;
     if (keepsSurface)
     {
       for (std::size_t i = 0; i < piece.triangles.size(); ++i)
@@ -715,7 +715,7 @@ private:
     }
     else
     {
-      tree = std::make_unique<TriangleTree>(piece.points, piece.triangles);
+      tree = std::make_unique<TriangleBvh>(piece.points, piece.triangles);
     }
     std::size_t kept = 0;
     for (const auto& [face, cell] : BoundaryFaces(cells))

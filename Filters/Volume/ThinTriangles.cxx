@@ -1,6 +1,6 @@
 #include "ThinTriangles.h"
 
-#include "TriangleTree.h"
+#include "NearestOnTriangle.h"
 
 #include <cmath>
 #include <limits>
@@ -280,9 +280,8 @@ private:
       }
       after = std::min(after, MinimumCornerAngle(moved[0], moved[1], moved[2]));
       distance = std::min(distance,
-        (ClosestPointOfTriangle(this->Surface.At(from), moved[0], moved[1], moved[2]) -
-          this->Surface.At(from))
-          .norm());
+        std::sqrt(
+          NearestOnTriangle(this->Surface.At(from), moved[0], moved[1], moved[2]).squaredDistance));
     }
     if (!(after > before + 1e-6) || distance > deviation * this->MeanEdge(fans, from))
     {
@@ -346,10 +345,9 @@ private:
       {
         const Triangle& t = this->Surface.cells[c].corners;
         distance = std::min(distance,
-          (ClosestPointOfTriangle(
-             next, this->Surface.At(t[0]), this->Surface.At(t[1]), this->Surface.At(t[2])) -
-            next)
-            .norm());
+          std::sqrt(NearestOnTriangle(
+            next, this->Surface.At(t[0]), this->Surface.At(t[1]), this->Surface.At(t[2]))
+                      .squaredDistance));
         Vector3 moved[3];
         for (int i = 0; i < 3; ++i)
         {

@@ -79,22 +79,6 @@ double RestCurvature(const Guidewire& wire, double distance)
   return 0.0;
 }
 
-double GuideCatheter::TurnedAngle(double behind) const
-{
-  double angle = 0.0;
-  double left = behind;
-  for (const CatheterArc& arc : this->shape)
-  {
-    if (!(left > 0.0))
-    {
-      break;
-    }
-    angle += std::abs(arc.curvature) * std::min(arc.length, left);
-    left -= arc.length;
-  }
-  return angle;
-}
-
 void GuideCatheter::Validate() const
 {
   const std::string whose = "Catheter '" + this->name + "'";

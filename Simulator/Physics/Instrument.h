@@ -89,9 +89,6 @@ struct GuideCatheter
   double friction = 0.0;          ///< coefficient of a wire against its inside, 0 to 2
   std::vector<CatheterArc> shape; ///< from the tip
 
-  /// Angle by which the catheter turns in all from its tip to `behind` mm behind it, radians.
-  double TurnedAngle(double behind) const;
-
   /// @throws std::invalid_argument naming the catheter and the property
   void Validate() const;
 };

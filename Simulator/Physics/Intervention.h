@@ -5,6 +5,7 @@
 #ifndef DynamicCoronary_Intervention_h
 #define DynamicCoronary_Intervention_h
 
+#include "DriveInput.h"
 #include "Geometry.h"
 #include "Instrument.h"
 
@@ -16,16 +17,6 @@
 namespace coronary
 {
 class WallMotion;
-
-/// What hands do, in one tick: where the proximal ends of the instruments are.
-struct DriveInput
-{
-  double wirePosition = 0.0; ///< mm advanced since the start
-  double wireAngle = 0.0;    ///< radians turned since the start, right-handed about the way forward
-  double catheterPosition =
-    0.0;                      ///< mm the catheter's tip is advanced into the vessel since the start
-  double catheterAngle = 0.0; ///< radians
-};
 
 struct InterventionSettings
 {

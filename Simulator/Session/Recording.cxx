@@ -5,6 +5,8 @@
 #include "JsonFields.h"
 #include "WallMotion.h"
 
+#include <zlib.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -21,58 +23,48 @@ namespace
 {
 using Json = nlohmann::json;
 
-constexpr std::array<char, 8> Magic{ 'P', 'C', 'I', 'R', 'E', 'C', '\0', '\1' };
+constexpr std::array<char, 8> Magic{ 'P', 'C', 'I', 'R', 'E', 'C', '\0', '\2' };
 constexpr std::size_t MagicName = 7; // the last byte is the version
 constexpr std::uint32_t MostHeader = 16U << 20;
-constexpr std::uint32_t MostPayload = 1U << 20;
+constexpr std::uint32_t MostBlock = 1U << 20;
+constexpr std::size_t EnoughForBlock = 65536;
 constexpr std::uint64_t MostTicks = std::uint64_t{ 1 } << 40; // 17 years at 2 kHz
-constexpr std::size_t FramesOfChunk = 100;
-/// In the order of their bits in the mask of a frame: what moves often comes first. The pedals are behind the syringe.
+constexpr std::size_t BlockHead = 4 + 4;
+constexpr std::size_t ItemHead = 1 + 4 + 8;
+constexpr int Compression = 1; // fast: it happens between two ticks
+
+/// Bits of the numbers of an input, in the order of the header's axes; the pedals come last.
 constexpr std::size_t Axes = HandAxes + 1;
-constexpr std::size_t PedalAxis = IndexOf(AxisKind::Syringe) + 1;
+using InputBits = std::array<std::uint64_t, Axes>;
 
-const char* AxisName(std::size_t axis)
-{
-  return axis == PedalAxis ? "pedals" : HandAxisTable[axis - (axis > PedalAxis ? 1 : 0)].recorded;
-}
-
-const char* AxisUnitName(std::size_t axis)
-{
-  return axis == PedalAxis ? "bits"
-                           : UnitName(HandAxisTable[axis - (axis > PedalAxis ? 1 : 0)].unit);
-}
-
-constexpr std::size_t DriveAxes = 4; ///< recordings may have only these, the first ones
-
-std::array<std::uint64_t, Axes> BitsOf(const SessionInput& input)
+InputBits BitsOf(const SessionInput& input)
 {
   const AxisPlaces places = PlacesOf(input);
-  std::array<double, Axes> values{};
-  std::copy_n(places.begin(), PedalAxis, values.begin());
-  values[PedalAxis] = static_cast<double>(input.pedals);
-  std::copy(places.begin() + PedalAxis, places.end(), values.begin() + PedalAxis + 1);
-  std::array<std::uint64_t, Axes> bits{};
-  std::memcpy(bits.data(), values.data(), sizeof(bits));
+  InputBits bits{};
+  std::memcpy(bits.data(), places.data(), sizeof(places));
+  bits[HandAxes] = input.pedals;
   return bits;
 }
 
-/// A number of pedals that no pedals have is no pedal.
-std::uint32_t PedalsOf(double value)
+SessionInput InputOf(const InputBits& bits)
 {
-  return value >= 0.0 && value <= 4294967295.0 ? static_cast<std::uint32_t>(value) : 0U;
-}
-
-SessionInput InputOf(const std::array<std::uint64_t, Axes>& bits)
-{
-  std::array<double, Axes> values{};
-  std::memcpy(values.data(), bits.data(), sizeof(values));
   AxisPlaces places{};
-  std::copy_n(values.begin(), PedalAxis, places.begin());
-  std::copy(values.begin() + PedalAxis + 1, values.end(), places.begin() + PedalAxis);
+  std::memcpy(places.data(), bits.data(), sizeof(places));
   SessionInput input;
   SetPlaces(input, places);
-  input.pedals = PedalsOf(values[PedalAxis]);
+  input.pedals = static_cast<std::uint32_t>(bits[HandAxes]);
   return input;
+}
+
+Json AxesJson()
+{
+  Json axes = Json::array();
+  for (const HandAxis& axis : HandAxisTable)
+  {
+    axes.push_back({ { "name", axis.recorded }, { "unit", UnitName(axis.unit) } });
+  }
+  axes.push_back({ { "name", "pedals" }, { "unit", "bits" } });
+  return axes;
 }
 
 /// Files are little-endian, whatever the machine is.
@@ -94,68 +86,6 @@ std::uint64_t Little(const char* bytes, int size)
   return value;
 }
 
-void PutVarint(std::string& bytes, std::uint64_t value)
-{
-  while (value >= 0x80)
-  {
-    bytes.push_back(static_cast<char>(value | 0x80));
-    value >>= 7;
-  }
-  bytes.push_back(static_cast<char>(value));
-}
-
-bool TakeVarint(const std::string& bytes, std::size_t& at, std::uint64_t& value)
-{
-  value = 0;
-  for (int shift = 0; shift < 64 && at < bytes.size(); shift += 7)
-  {
-    const auto byte = static_cast<unsigned char>(bytes[at++]);
-    if (shift == 63 && byte > 1)
-    {
-      return false;
-    }
-    value |= static_cast<std::uint64_t>(byte & 0x7F) << shift;
-    if (byte < 0x80)
-    {
-      return true;
-    }
-  }
-  return false;
-}
-
-/// Small for small differences of either sign.
-std::uint64_t ZigZag(std::uint64_t difference)
-{
-  return (difference << 1) ^ (0 - (difference >> 63));
-}
-
-std::uint64_t UnZigZag(std::uint64_t code)
-{
-  return (code >> 1) ^ (0 - (code & 1));
-}
-
-/// Bits of the axes are predicted from the last two frames as if they went on evenly, which steady driving nearly does.
-struct AxisPredictor
-{
-  std::array<std::uint64_t, Axes> last = BitsOf(SessionInput());
-  std::array<std::uint64_t, Axes> step{};
-
-  std::uint64_t Encode(std::size_t axis, std::uint64_t bits)
-  {
-    const std::uint64_t difference = bits - this->last[axis];
-    const std::uint64_t code = ZigZag(difference - this->step[axis]);
-    this->step[axis] = difference;
-    this->last[axis] = bits;
-    return code;
-  }
-
-  void Decode(std::size_t axis, std::uint64_t code)
-  {
-    this->step[axis] += UnZigZag(code);
-    this->last[axis] += this->step[axis];
-  }
-};
-
 std::uint64_t HexadecimalOf(JsonFields& fields, const char* name)
 {
   const std::string text = fields.Text(name);
@@ -168,22 +98,17 @@ std::uint64_t HexadecimalOf(JsonFields& fields, const char* name)
 
 std::string HeaderText(const RecordingHeader& header)
 {
-  Json axes = Json::array();
-  for (std::size_t axis = 0; axis < Axes; ++axis)
-  {
-    axes.push_back({ { "name", AxisName(axis) }, { "unit", AxisUnitName(axis) } });
-  }
   const Json scenario =
     header.scenario.empty() ? Json::object() : ParseBoundedJson(header.scenario, "The scenario");
   const std::string text = scenario.dump();
   Json json = { { "schema", 1 }, { "build", header.build }, { "scenario", scenario },
     { "scenario_hash", Hexadecimal(Fnv1a(text.data(), text.size())) },
     { "mesh_hash", Hexadecimal(header.meshHash) }, { "seed", Hexadecimal(header.seed) },
-    { "tick_hz", header.tickRate }, { "axes", axes }, { "start_utc", header.started } };
+    { "tick_hz", header.tickRate }, { "axes", AxesJson() }, { "start_utc", header.started } };
   return json.dump();
 }
 
-RecordingHeader HeaderOf(const std::string& text, const std::string& origin, std::size_t& axisCount)
+RecordingHeader HeaderOf(const std::string& text, const std::string& origin)
 {
   const std::string where = "The header of " + origin;
   const Json json = ParseBoundedJson(text, where);
@@ -204,46 +129,12 @@ RecordingHeader HeaderOf(const std::string& text, const std::string& origin, std
   header.seed = HexadecimalOf(fields, "seed");
   header.tickRate = fields.Number("tick_hz", 1.0, 1e6);
   header.started = fields.Text("start_utc");
-  const Json& axes = fields.List("axes");
-  bool same = axes.size() == Axes || axes.size() == DriveAxes;
-  for (std::size_t n = 0; same && n < axes.size(); ++n)
-  {
-    same = axes[n] == Json{ { "name", AxisName(n) }, { "unit", AxisUnitName(n) } };
-  }
-  if (!same)
+  if (fields.List("axes") != AxesJson())
   {
     fields.Refuse("has other axes than those of wire, catheter, syringe, pedals and C-arm");
   }
-  axisCount = axes.size();
   return header;
 }
-
-constexpr std::size_t ChunkHead = 4 + 1 + 8;
-}
-
-std::uint32_t Crc32(const void* data, std::size_t size, std::uint32_t before)
-{
-  static const std::array<std::uint32_t, 256> table = []
-  {
-    std::array<std::uint32_t, 256> entries{};
-    for (std::uint32_t n = 0; n < 256; ++n)
-    {
-      std::uint32_t value = n;
-      for (int bit = 0; bit < 8; ++bit)
-      {
-        value = (value & 1U) != 0 ? (value >> 1) ^ 0xEDB88320U : value >> 1;
-      }
-      entries[n] = value;
-    }
-    return entries;
-  }();
-  const auto* bytes = static_cast<const unsigned char*>(data);
-  std::uint32_t crc = ~before;
-  for (std::size_t n = 0; n < size; ++n)
-  {
-    crc = (crc >> 8) ^ table[(crc ^ bytes[n]) & 0xFFU];
-  }
-  return ~crc;
 }
 
 std::string Hexadecimal(std::uint64_t value)
@@ -259,12 +150,9 @@ struct RecordingWriter::Internals
   std::ofstream own;
   std::ostream* stream = nullptr;
   std::string name;
-  AxisPredictor axes;
-  std::uint64_t lastTick = 0;      ///< of anything
-  std::string frames;              ///< waiting
-  std::uint64_t frameTick = 0;     ///< of the first that waits
-  std::uint64_t lastFrameTick = 0; ///< of the last that waits
-  std::size_t waiting = 0;
+  std::string block; ///< items that wait
+  std::uint64_t lastTick = 0;
+  InputBits last = BitsOf(SessionInput());
   std::array<std::uint64_t, 8> counts{};
 
   void Check()
@@ -289,25 +177,23 @@ struct RecordingWriter::Internals
     this->Write(bytes + text);
   }
 
-  void Chunk(RecordType type, std::uint64_t tick, const std::string& payload)
+  void WriteBlock()
   {
-    std::string bytes;
-    PutLittle(bytes, payload.size(), 4);
-    bytes.push_back(static_cast<char>(type));
-    PutLittle(bytes, tick, 8);
-    bytes += payload;
-    PutLittle(bytes, Crc32(bytes.data(), bytes.size()), 4);
-    this->Write(bytes);
-  }
-
-  void FlushFrames()
-  {
-    if (this->waiting > 0)
+    uLongf size = compressBound(static_cast<uLong>(this->block.size()));
+    std::string packed(size, '\0');
+    if (compress2(reinterpret_cast<Bytef*>(packed.data()), &size,
+          reinterpret_cast<const Bytef*>(this->block.data()),
+          static_cast<uLong>(this->block.size()), Compression) != Z_OK)
     {
-      this->Chunk(RecordType::Input, this->frameTick, this->frames);
-      this->frames.clear();
-      this->waiting = 0;
+      throw std::runtime_error("Cannot compress what '" + this->name + "' is to hold.");
     }
+    std::string head;
+    PutLittle(head, size, 4);
+    PutLittle(head, this->block.size(), 4);
+    this->Write(head);
+    packed.resize(size);
+    this->Write(packed);
+    this->block.clear();
   }
 
   void Advance(std::uint64_t tick)
@@ -317,15 +203,21 @@ struct RecordingWriter::Internals
       throw std::invalid_argument("Tick " + std::to_string(tick) + " of a recording comes after " +
         std::to_string(this->lastTick) + ".");
     }
-    this->lastTick = tick;
   }
 
   void Put(RecordType type, std::uint64_t tick, const std::string& payload)
   {
     this->Advance(tick);
-    this->FlushFrames();
-    this->Chunk(type, tick, payload);
+    this->block.push_back(static_cast<char>(type));
+    PutLittle(this->block, payload.size(), 4);
+    PutLittle(this->block, tick - this->lastTick, 8);
+    this->block += payload;
+    this->lastTick = tick;
     ++this->counts[static_cast<std::size_t>(type)];
+    if (this->block.size() >= EnoughForBlock)
+    {
+      this->WriteBlock();
+    }
   }
 };
 
@@ -353,35 +245,26 @@ void RecordingWriter::Input(std::uint64_t tick, const SessionInput& input)
 {
   Internals& data = *this->Data;
   data.Advance(tick);
-  const std::array<std::uint64_t, Axes> bits = BitsOf(input);
-  if (bits == data.axes.last)
+  const InputBits bits = BitsOf(input);
+  if (bits == data.last)
   {
     return;
   }
-  if (data.waiting == 0)
-  {
-    data.frameTick = data.lastFrameTick = tick;
-  }
-  PutVarint(data.frames, tick - data.lastFrameTick);
-  data.lastFrameTick = tick;
+  // Bits of numbers that grow evenly have almost even differences, which pack well.
   std::uint64_t mask = 0;
+  std::string changes;
   for (std::size_t axis = 0; axis < Axes; ++axis)
   {
-    mask |= std::uint64_t{ bits[axis] != data.axes.last[axis] ? 1U : 0U } << axis;
-  }
-  PutVarint(data.frames, mask);
-  for (std::size_t axis = 0; axis < Axes; ++axis)
-  {
-    if ((mask >> axis & 1) != 0)
+    if (bits[axis] != data.last[axis])
     {
-      PutVarint(data.frames, data.axes.Encode(axis, bits[axis]));
+      mask |= std::uint64_t{ 1 } << axis;
+      PutLittle(changes, bits[axis] - data.last[axis], 8);
     }
   }
-  ++data.counts[static_cast<std::size_t>(RecordType::Input)];
-  if (++data.waiting == FramesOfChunk)
-  {
-    data.FlushFrames();
-  }
+  data.last = bits;
+  std::string payload;
+  PutLittle(payload, mask, 2);
+  data.Put(RecordType::Input, tick, payload + changes);
 }
 
 void RecordingWriter::Force(std::uint64_t tick, const RecordedForces& forces)
@@ -411,6 +294,7 @@ void RecordingWriter::StateHash(std::uint64_t tick, std::uint64_t hash)
   std::string payload;
   PutLittle(payload, hash, 8);
   this->Data->Put(RecordType::StateHash, tick, payload);
+  this->Data->WriteBlock();
   this->Data->stream->flush();
   this->Data->Check();
 }
@@ -436,14 +320,14 @@ void RecordingWriter::Finish(std::uint64_t ticks)
 {
   Internals& data = *this->Data;
   data.Advance(ticks);
-  data.FlushFrames();
   std::string payload;
   data.counts[0] = ticks;
   for (std::size_t n = 0; n < static_cast<std::size_t>(RecordType::End); ++n)
   {
     PutLittle(payload, data.counts[n], 8);
   }
-  data.Chunk(RecordType::End, ticks, payload);
+  data.Put(RecordType::End, ticks, payload);
+  data.WriteBlock();
   data.stream->flush();
   data.Check();
   if (data.file)
@@ -464,13 +348,10 @@ struct RecordingReader::Internals
   std::uint64_t unknown = 0;
   std::uint64_t bytes = 0;
   std::uint64_t lastTick = 0;
-  AxisPredictor axes;
-  std::size_t axisCount = Axes; ///< of the file
+  InputBits last = BitsOf(SessionInput());
   std::array<std::uint64_t, 8> counts{};
-  // The input chunk that is being read.
-  std::string frames;
+  std::string block; ///< that is being read
   std::size_t at = 0;
-  std::uint64_t frameTick = 0;
 
   /// Up to `size` bytes, never more memory than there are bytes.
   std::string Take(std::size_t size)
@@ -517,7 +398,7 @@ struct RecordingReader::Internals
     {
       throw std::runtime_error(this->origin + " is a recording of version " +
         std::to_string(static_cast<int>(static_cast<unsigned char>(start[MagicName]))) +
-        "; only version 1 is known.");
+        "; only version 2 is known.");
     }
     const auto size = static_cast<std::uint32_t>(Little(&start[Magic.size()], 4));
     if (size > MostHeader)
@@ -532,7 +413,7 @@ struct RecordingReader::Internals
     }
     try
     {
-      this->header = HeaderOf(text, this->origin, this->axisCount);
+      this->header = HeaderOf(text, this->origin);
     }
     catch (const std::invalid_argument& error)
     {
@@ -541,36 +422,34 @@ struct RecordingReader::Internals
     this->bytes = start.size() + text.size();
   }
 
-  bool NextFrame(RecordedItem& item)
+  bool NextBlock()
   {
-    std::uint64_t gap = 0;
-    std::uint64_t mask = 0;
-    if (!TakeVarint(this->frames, this->at, gap) || !TakeVarint(this->frames, this->at, mask))
+    const std::string head = this->Take(BlockHead);
+    if (head.size() < BlockHead)
     {
-      return this->Damaged("an input frame breaks off");
+      return this->End(Ending::Torn, head.empty() ? "it has no end" : "its last block breaks off");
     }
-    if (gap >= MostTicks || this->frameTick + gap >= MostTicks || mask == 0 ||
-      mask >> this->axisCount != 0)
+    const auto packedSize = static_cast<std::uint32_t>(Little(&head[0], 4));
+    const auto size = static_cast<std::uint32_t>(Little(&head[4], 4));
+    if (size > MostBlock || packedSize > compressBound(MostBlock))
     {
-      return this->Damaged("an input frame has no sense");
+      return this->Damaged("a block says that it has " + std::to_string(size) + " bytes");
     }
-    this->frameTick += gap;
-    for (std::size_t axis = 0; axis < Axes; ++axis)
+    const std::string packed = this->Take(packedSize);
+    if (packed.size() < packedSize)
     {
-      std::uint64_t code = 0;
-      if ((mask >> axis & 1) != 0)
-      {
-        if (!TakeVarint(this->frames, this->at, code))
-        {
-          return this->Damaged("an input frame breaks off");
-        }
-        this->axes.Decode(axis, code);
-      }
+      return this->End(Ending::Torn, "its last block breaks off");
     }
-    item.type = RecordType::Input;
-    item.tick = this->lastTick = this->frameTick;
-    item.input = InputOf(this->axes.last);
-    ++this->counts[static_cast<std::size_t>(RecordType::Input)];
+    this->block.assign(size, '\0');
+    this->at = 0;
+    uLongf got = size;
+    if (uncompress(reinterpret_cast<Bytef*>(this->block.data()), &got,
+          reinterpret_cast<const Bytef*>(packed.data()), packedSize) != Z_OK ||
+      got != size)
+    {
+      return this->Damaged("the check sum of a block does not fit");
+    }
+    this->bytes += head.size() + packed.size();
     return true;
   }
 
@@ -578,53 +457,40 @@ struct RecordingReader::Internals
   {
     while (this->ending == Ending::NotYet)
     {
-      if (this->at < this->frames.size())
+      if (this->at >= this->block.size())
       {
-        return this->NextFrame(item);
+        if (!this->NextBlock())
+        {
+          return false;
+        }
+        continue;
       }
-      const std::string head = this->Take(ChunkHead);
-      if (head.size() < ChunkHead)
+      if (this->block.size() - this->at < ItemHead)
       {
-        return this->End(
-          Ending::Torn, head.empty() ? "it has no end" : "its last chunk breaks off");
+        return this->Damaged("an item breaks off");
       }
-      const auto size = static_cast<std::uint32_t>(Little(&head[0], 4));
-      const auto type = static_cast<std::uint8_t>(head[4]);
-      const std::uint64_t tick = Little(&head[5], 8);
-      if (size > MostPayload)
+      const auto type = static_cast<std::uint8_t>(this->block[this->at]);
+      const std::uint64_t size = Little(&this->block[this->at + 1], 4);
+      const std::uint64_t gap = Little(&this->block[this->at + 5], 8);
+      this->at += ItemHead;
+      if (size > this->block.size() - this->at)
       {
-        return this->Damaged("a chunk says that it has " + std::to_string(size) + " bytes");
+        return this->Damaged("an item breaks off");
       }
-      const std::string payload = this->Take(size);
-      const std::string sum = this->Take(payload.size() < size ? 0 : 4);
-      if (sum.size() < 4)
+      if (gap >= MostTicks || this->lastTick + gap >= MostTicks)
       {
-        return this->End(Ending::Torn, "its last chunk breaks off");
+        return this->Damaged("an item's tick has no sense");
       }
-      if (Crc32(payload.data(), size, Crc32(head.data(), head.size())) != Little(&sum[0], 4))
-      {
-        return this->Damaged("the check sum of a chunk does not fit");
-      }
-      if (tick < this->lastTick || tick >= MostTicks)
-      {
-        return this->Damaged("a chunk's tick goes back");
-      }
-      this->lastTick = tick;
-      this->bytes += head.size() + payload.size() + sum.size();
+      const std::string payload = this->block.substr(this->at, size);
+      this->at += size;
+      this->lastTick += gap;
       if (type < 1 || type > static_cast<std::uint8_t>(RecordType::End))
       {
         ++this->unknown;
         continue;
       }
       item.type = static_cast<RecordType>(type);
-      item.tick = tick;
-      if (item.type == RecordType::Input)
-      {
-        this->frames = payload;
-        this->at = 0;
-        this->frameTick = tick;
-        continue;
-      }
+      item.tick = this->lastTick;
       if (!this->Decode(payload, item))
       {
         return false;
@@ -635,16 +501,43 @@ struct RecordingReader::Internals
     return false;
   }
 
+  bool DecodeInput(const std::string& payload, RecordedItem& item)
+  {
+    const std::uint64_t mask = Little(&payload[0], 2);
+    std::size_t place = 2;
+    for (std::size_t axis = 0; axis < Axes; ++axis)
+    {
+      if ((mask >> axis & 1) == 0)
+      {
+        continue;
+      }
+      if (payload.size() < place + 8)
+      {
+        return this->Damaged("an input breaks off");
+      }
+      this->last[axis] += Little(&payload[place], 8);
+      place += 8;
+    }
+    if (mask == 0 || mask >> Axes != 0)
+    {
+      return this->Damaged("an input has no sense");
+    }
+    item.input = InputOf(this->last);
+    return true;
+  }
+
   bool Decode(const std::string& payload, RecordedItem& item)
   {
     // What a later writer adds at the end of a payload is left alone.
-    static constexpr std::array<std::size_t, 8> minimum{ 0, 0, 16, 9, 8, 8, 0, 56 };
+    static constexpr std::array<std::size_t, 8> minimum{ 0, 2, 16, 9, 8, 8, 0, 56 };
     if (payload.size() < minimum[static_cast<std::size_t>(item.type)])
     {
-      return this->Damaged("a chunk is too short for its type");
+      return this->Damaged("an item is too short for its type");
     }
     switch (item.type)
     {
+      case RecordType::Input:
+        return this->DecodeInput(payload, item);
       case RecordType::Force:
       {
         std::array<float, 4> values{};
@@ -678,14 +571,14 @@ struct RecordingReader::Internals
       item.counts[n] = Little(&payload[8 * n], 8);
       if (n > 0 && item.counts[n] != this->counts[n])
       {
-        return this->Damaged("its end counts other chunks than there are");
+        return this->Damaged("its end counts other items than there are");
       }
     }
     if (item.counts[0] != item.tick)
     {
       return this->Damaged("its end contradicts itself");
     }
-    if (this->stream->peek() != std::istream::traits_type::eof())
+    if (this->at < this->block.size() || this->stream->peek() != std::istream::traits_type::eof())
     {
       this->End(Ending::Damaged, "bytes follow its end");
       return true;
@@ -761,26 +654,26 @@ RecordingReplay::RecordingReplay(RecordingReader reader)
 {
 }
 
-void RecordingReplay::ReadUpTo(std::uint64_t tick)
+void RecordingReplay::ReadUpTo(std::uint64_t tick, bool step)
 {
   while (!this->Over)
   {
-    if (!this->HasAhead)
+    if (!this->HasAhead && !this->Source.Next(this->Ahead))
     {
-      if (!this->Source.Next(this->Ahead))
-      {
-        this->Over = true;
-        return;
-      }
-      this->HasAhead = true;
+      this->Over = true;
+      return;
     }
+    this->HasAhead = true;
     const RecordedItem& item = this->Ahead;
-    // A hash of tick t belongs to the state after step t - 1; it is there before step t is asked for.
-    if (item.tick > tick)
+    // Inputs and events are of the step that comes; all others of the state before it.
+    const bool ofStep = item.type == RecordType::Input || item.type == RecordType::Event;
+    if (item.tick > tick ||
+      (!step && item.tick == tick && (ofStep || item.type == RecordType::End)))
     {
       return;
     }
     this->HasAhead = false;
+    this->Ticks = std::max(this->Ticks, item.tick + (ofStep ? 1 : 0));
     switch (item.type)
     {
       case RecordType::Input:
@@ -793,23 +686,19 @@ void RecordingReplay::ReadUpTo(std::uint64_t tick)
         this->Hashes[item.tick] = item.hash;
         break;
       case RecordType::End:
-        this->Ended = true;
         this->Ticks = item.tick;
         this->Over = true;
-        return;
+        break;
       default:
         break;
     }
-    // Inputs and events are of the step that comes; all others of the state before it.
-    const bool before = item.type == RecordType::Input || item.type == RecordType::Event;
-    this->Ticks = std::max(this->Ticks, item.tick + (before ? 1 : 0));
   }
 }
 
 bool RecordingReplay::At(
   std::uint64_t tick, SessionInput& input, std::vector<RecordedEvent>& events)
 {
-  this->ReadUpTo(tick);
+  this->ReadUpTo(tick, true);
   events.clear();
   if (this->Over && tick >= this->Ticks)
   {
@@ -822,31 +711,7 @@ bool RecordingReplay::At(
 
 bool RecordingReplay::ExpectedHash(std::uint64_t tick, std::uint64_t& hash)
 {
-  // What comes at this tick after the hash belongs to the next step, and stays ahead until then.
-  while (!this->Over && this->Hashes.count(tick) == 0)
-  {
-    if (!this->HasAhead)
-    {
-      if (!this->Source.Next(this->Ahead))
-      {
-        this->Over = true;
-        break;
-      }
-      this->HasAhead = true;
-    }
-    const RecordType type = this->Ahead.type;
-    if (this->Ahead.tick > tick || type == RecordType::Input || type == RecordType::Event ||
-      type == RecordType::End)
-    {
-      break;
-    }
-    if (type == RecordType::StateHash)
-    {
-      this->Hashes[this->Ahead.tick] = this->Ahead.hash;
-    }
-    this->Ticks = std::max(this->Ticks, this->Ahead.tick);
-    this->HasAhead = false;
-  }
+  this->ReadUpTo(tick, false);
   const auto found = this->Hashes.find(tick);
   const bool known = found != this->Hashes.end();
   if (known)

@@ -22,9 +22,7 @@
 
 namespace coronary
 {
-/// CRC-32/ISO-HDLC (polynomial 0x04C11DB7 reflected, all ones before and after): of "123456789" 0xCBF43926.
-/// @param before  the value of what comes before, to go on from
-std::uint32_t Crc32(const void* data, std::size_t size, std::uint32_t before = 0);
+class WallMotion;
 
 /// 16 digits, as hashes are written.
 std::string Hexadecimal(std::uint64_t value);
@@ -124,8 +122,8 @@ struct RecordedItem
 };
 
 /**
- * Reads item by item, and holds no more than one chunk. A file that breaks off, or whose bytes are damaged, is good up
- * to there.
+ * Reads item by item, and holds no more than one block. A file that breaks off, or whose bytes are damaged, is good up
+ * to the block before.
  */
 class RecordingReader
 {
@@ -135,7 +133,7 @@ public:
     NotYet,   ///< Next() has not come to the end
     Complete, ///< with its end and all that it counts
     Torn,     ///< the file stops too early
-    Damaged   ///< a chunk is not what it should be; all before it was good
+    Damaged   ///< a block is not what it should be; all before it was good
   };
 
   /// @throws std::runtime_error naming the file: not there, no recording, of another version, a broken header
@@ -153,7 +151,7 @@ public:
 
   Ending HowEnded() const;
   std::string EndingText() const; ///< for people
-  std::uint64_t Unknown() const;  ///< chunks of unknown type, skipped
+  std::uint64_t Unknown() const;  ///< items of unknown type, skipped
   std::uint64_t Bytes() const;    ///< that were good
 
 private:
@@ -180,13 +178,13 @@ public:
   bool ExpectedHash(std::uint64_t tick, std::uint64_t& hash);
 
 private:
-  void ReadUpTo(std::uint64_t tick);
+  /// @param step  with what step `tick` gets; else only what is of the state before it
+  void ReadUpTo(std::uint64_t tick, bool step);
 
   RecordingReader Source;
   RecordedItem Ahead;
   bool HasAhead = false;
   bool Over = false;
-  bool Ended = false;      ///< with an end that says how many ticks there are
   std::uint64_t Ticks = 0; ///< of the end; without one: after the last good item
   SessionInput Current;
   std::vector<RecordedEvent> Pending;

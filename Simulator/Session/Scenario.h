@@ -7,11 +7,10 @@
 #define DynamicCoronary_Scenario_h
 
 #include "CArm.h"
-#include "ContractionMotion.h"
 #include "ContrastModel.h"
-#include "CoronaryPhantom.h"
 #include "Instrument.h"
 #include "Intervention.h"
+#include "VesselSource.h"
 #include "WallMotion.h"
 
 #include <cstdint>
@@ -21,31 +20,6 @@
 
 namespace coronary
 {
-enum class VesselMotion
-{
-  Automatic, ///< tracked if there is a tracked motion, else still
-  Tracked,   ///< that of the run
-  Still,
-  Contraction ///< by formula
-};
-
-/// Where the vessels are from.
-struct VesselSource
-{
-  enum class Kind
-  {
-    Phantom,
-    Run,    ///< a folder of coronary-pipeline run
-    Surface ///< a closed surface and its centerline tree
-  };
-  Kind kind = Kind::Phantom;
-  std::string path;       ///< of Run and Surface; empty: the user has to say
-  std::string centerline; ///< of Surface
-  PhantomSettings phantom;
-  VesselMotion motion = VesselMotion::Automatic;
-  ContractionSettings contraction;
-};
-
 /// What the C-arm sees, and how it stands at the start.
 struct ImagingSettings
 {

@@ -145,11 +145,11 @@ bool SessionRunner::Step()
   }
   if (this->Writer && this->Number % RecordedHashInterval == 0)
   {
-    this->Writer->StateHash(this->Number, this->Training.StateHash());
+    this->Writer->StateHash(this->Number, this->StateHash());
   }
   if (std::uint64_t wanted = 0; this->Source->ExpectedHash(this->Number, wanted) && !this->Changed)
   {
-    const bool same = wanted == this->Training.StateHash();
+    const bool same = wanted == this->StateHash();
     ++this->Comparison.compared;
     this->Comparison.equal += same ? 1 : 0;
     if (!same && this->Comparison.firstDifference == 0)
@@ -168,6 +168,16 @@ bool SessionRunner::Step()
   return true;
 }
 
+std::uint64_t SessionRunner::StateHash()
+{
+  if (this->HashedTick != this->Number)
+  {
+    this->Hash = this->Training.StateHash();
+    this->HashedTick = this->Number;
+  }
+  return this->Hash;
+}
+
 void SessionRunner::FinishRecording()
 {
   // Whatever happens now, it is over with the recording: without Finish() it leaves no file.
@@ -178,7 +188,7 @@ void SessionRunner::FinishRecording()
   }
   if (this->Number % RecordedHashInterval != 0)
   {
-    writer->StateHash(this->Number, this->Training.StateHash());
+    writer->StateHash(this->Number, this->StateHash());
   }
   writer->Finish(this->Number);
 }

@@ -117,6 +117,7 @@ public:
 
   const TrainingSession& Session() const { return this->Training; }
   std::uint64_t Tick() const { return this->Number; } ///< steps done
+  std::uint64_t StateHash();                          ///< of now; made once a tick
   const HashComparison& Compared() const { return this->Comparison; }
   std::uint64_t UnknownEvents() const { return this->Unknown; }
 
@@ -139,6 +140,8 @@ private:
   std::uint64_t Unknown = 0;
   bool Changed = false; ///< by what was posted
   HashComparison Comparison;
+  std::uint64_t Hash = 0;
+  std::uint64_t HashedTick = ~std::uint64_t{ 0 };
 };
 }
 

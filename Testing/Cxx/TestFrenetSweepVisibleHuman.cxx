@@ -6,8 +6,8 @@
 #include "Instrumented.h"
 #include "SharedSurface.h"
 #include "SurfaceMeasures.h"
+#include "TriangleBvh.h"
 #include "TriangleIntersections.h"
-#include "TriangleTree.h"
 #include "vtkFastMarchingCenterline.h"
 #include "vtkSurfaceCleaner.h"
 
@@ -138,7 +138,7 @@ void SweepCoronaries(const std::string& name)
   {
     sum += radii->GetTuple1(i) / static_cast<double>(radii->GetNumberOfTuples());
   }
-  const coronary::TriangleTree tree(points, triangles);
+  const coronary::TriangleBvh tree(points, triangles);
   std::vector<double> away;
   vtkPolyData* clean = cleaner->GetOutput();
   for (vtkIdType i = 0; i < clean->GetNumberOfPoints(); i += 7)

@@ -1,5 +1,6 @@
 // Hardware on pseudo-terminals, in real time.
 #include "DeviceMux.h"
+#include "DeviceUri.h"
 #include "KeyboardDevice.h"
 #include "PseudoTerminal.h"
 #include "ScriptedDevice.h"

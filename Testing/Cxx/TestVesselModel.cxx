@@ -1,4 +1,5 @@
 // Vessels out of a run's files: the right points move with the right bones, and what is broken is named.
+#include "Scenario.h"
 #include "VesselModel.h"
 
 #include "VesselTestData.h"

@@ -2,7 +2,6 @@
 #include "Cobs.h"
 #include "CounterRandom.h"
 #include "DeviceProtocol.h"
-#include "Recording.h"
 
 #include <gtest/gtest.h>
 
@@ -202,11 +201,6 @@ TEST(Cobs, WhatIsNoCode)
   {
     EXPECT_EQ(CobsDecode(bytes.data(), bytes.size()), 0U) << Hex(bytes);
   }
-}
-
-TEST(Crc, CheckValue)
-{
-  EXPECT_EQ(Crc32("123456789", 9), 0xCBF43926U);
 }
 
 TEST(DeviceProtocol, MessagesThereAndBack)

@@ -3,6 +3,7 @@
 #include "CounterRandom.h"
 #include "DeviceMux.h"
 #include "DeviceScenario.h"
+#include "DeviceUri.h"
 #include "KeyboardDevice.h"
 #include "RecordedDevices.h"
 #include "Recording.h"

@@ -142,21 +142,13 @@ TEST(UnitTestInstrumentCatalogue, EveryValueHasASource)
 
 TEST(UnitTestInstrumentCatalogue, ShapesTurnAsTheirArcsSay)
 {
-  coronary::GuideCatheter catheter = BuiltInCatalogue().Catheter("JL4-6F").catheter;
-  double behind = 0.0;
+  const coronary::GuideCatheter catheter = BuiltInCatalogue().Catheter("JL4-6F").catheter;
   double turned = 0.0;
   for (const auto& arc : catheter.shape)
   {
-    EXPECT_NEAR(catheter.TurnedAngle(behind), turned, 1e-12);
-    EXPECT_NEAR(catheter.TurnedAngle(behind + 0.5 * arc.length),
-      turned + 0.5 * arc.length * std::abs(arc.curvature), 1e-12);
-    behind += arc.length;
     turned += arc.length * std::abs(arc.curvature);
   }
   EXPECT_NEAR(turned, (110.0 + 160.0 + 35.0) * M_PI / 180.0, 1e-9);
-  EXPECT_NEAR(catheter.TurnedAngle(1e6), turned, 1e-12);
-  EXPECT_EQ(catheter.TurnedAngle(-1.0), 0.0);
-  EXPECT_EQ(catheter.TurnedAngle(std::nan("")), 0.0);
 }
 
 TEST(UnitTestInstrumentCatalogue, RefusesWithThePlace)

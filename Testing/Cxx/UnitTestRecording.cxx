@@ -15,6 +15,8 @@
 #include <sstream>
 #include <unistd.h>
 
+#include <zlib.h>
+
 using coronary::RecordedItem;
 using coronary::RecordingReader;
 using coronary::RecordingWriter;
@@ -171,28 +173,37 @@ bool Same(const RecordedItem& a, const RecordedItem& b)
   }
 }
 
-std::string Chunk(std::uint8_t type, std::uint64_t tick, const std::string& payload)
+void PutLittle(std::string& bytes, std::uint64_t value, int size)
 {
-  std::string bytes;
-  for (int n = 0; n < 4; ++n)
+  for (int n = 0; n < size; ++n)
   {
-    bytes.push_back(static_cast<char>(payload.size() >> (8 * n)));
+    bytes.push_back(static_cast<char>(value >> (8 * n)));
   }
-  bytes.push_back(static_cast<char>(type));
-  for (int n = 0; n < 8; ++n)
-  {
-    bytes.push_back(static_cast<char>(tick >> (8 * n)));
-  }
-  bytes += payload;
-  const std::uint32_t crc = coronary::Crc32(bytes.data(), bytes.size());
-  for (int n = 0; n < 4; ++n)
-  {
-    bytes.push_back(static_cast<char>(crc >> (8 * n)));
-  }
-  return bytes;
 }
 
-/// Where the chunks begin.
+std::string Item(std::uint8_t type, std::uint64_t gap, const std::string& payload)
+{
+  std::string bytes(1, static_cast<char>(type));
+  PutLittle(bytes, payload.size(), 4);
+  PutLittle(bytes, gap, 8);
+  return bytes + payload;
+}
+
+std::string Block(const std::string& items)
+{
+  uLongf size = compressBound(static_cast<uLong>(items.size()));
+  std::string packed(size, '\0');
+  EXPECT_EQ(compress(reinterpret_cast<Bytef*>(packed.data()), &size,
+              reinterpret_cast<const Bytef*>(items.data()), static_cast<uLong>(items.size())),
+    Z_OK);
+  packed.resize(size);
+  std::string bytes;
+  PutLittle(bytes, size, 4);
+  PutLittle(bytes, items.size(), 4);
+  return bytes + packed;
+}
+
+/// Where the blocks begin.
 std::size_t HeaderSize(const std::string& bytes)
 {
   std::uint32_t size = 0;
@@ -201,11 +212,8 @@ std::size_t HeaderSize(const std::string& bytes)
 }
 }
 
-TEST(UnitTestRecording, CheckSumsAreTheStandardOnes)
+TEST(UnitTestRecording, HashesAreTheStandardOnes)
 {
-  EXPECT_EQ(coronary::Crc32("123456789", 9), 0xCBF43926U);
-  EXPECT_EQ(coronary::Crc32("6789", 4, coronary::Crc32("12345", 5)), 0xCBF43926U);
-  EXPECT_EQ(coronary::Crc32("", 0), 0U);
   // From the authors' test vectors.
   EXPECT_EQ(coronary::Fnv1a("", 0), 0xcbf29ce484222325U);
   EXPECT_EQ(coronary::Fnv1a("a", 1), 0xaf63dc4c8601ec8cU);
@@ -216,7 +224,7 @@ TEST(UnitTestRecording, GivesBackTheBits)
 {
   const std::vector<SessionInput> inputs = TestInputs(2500);
   const std::string bytes = Recorded(inputs);
-  EXPECT_EQ(bytes.substr(0, 8), std::string("PCIREC\0\1", 8));
+  EXPECT_EQ(bytes.substr(0, 8), std::string("PCIREC\0\2", 8));
   RecordingReader reader = ReaderOf(bytes);
   EXPECT_EQ(reader.Header().build, "test 1");
   EXPECT_EQ(reader.Header().scenario, R"({"list":[1,2.5],"name":"somewhere"})");
@@ -297,10 +305,11 @@ TEST(UnitTestRecording, TornAtEveryByteItIsGoodUpToThere)
       ASSERT_TRUE(Same(items[n], whole[n])) << size << " " << n;
     }
   }
-  EXPECT_EQ(before, whole.size() - 1);
+  EXPECT_GT(before, 300U) << "only the last block is lost";
+  EXPECT_EQ(whole[before - 1].type, RecordType::StateHash);
 }
 
-TEST(UnitTestRecording, EveryFlippedBitOfAChunkIsNoticed)
+TEST(UnitTestRecording, EveryFlippedBitOfABlockIsNoticed)
 {
   const std::string bytes = Recorded(TestInputs(300));
   std::vector<RecordedItem> whole;
@@ -314,8 +323,8 @@ TEST(UnitTestRecording, EveryFlippedBitOfAChunkIsNoticed)
       std::string changed = bytes;
       changed[at] = static_cast<char>(changed[at] ^ (1 << bit));
       ASSERT_TRUE(ReadAll(changed, items, ending));
-      ASSERT_NE(ending, Ending::Complete) << at << " " << bit;
-      ASSERT_LT(items.size(), whole.size()) << at << " " << bit;
+      // Bits between the packed bytes and their check sum mean nothing.
+      ASSERT_TRUE(ending != Ending::Complete || items.size() == whole.size()) << at << " " << bit;
       for (std::size_t n = 0; n < items.size(); ++n)
       {
         ASSERT_TRUE(Same(items[n], whole[n])) << at << " " << bit << " " << n;
@@ -328,8 +337,8 @@ TEST(UnitTestRecording, UnknownTypesAreSkippedAndCounted)
 {
   const std::string bytes = Recorded(TestInputs(300));
   const std::size_t header = HeaderSize(bytes);
-  const std::string more = bytes.substr(0, header) + Chunk(200, 0, "from the future") +
-    Chunk(0, 0, "") + bytes.substr(header);
+  const std::string more = bytes.substr(0, header) +
+    Block(Item(200, 0, "from the future") + Item(0, 0, "")) + bytes.substr(header);
   RecordingReader reader = ReaderOf(more);
   RecordedItem item;
   std::size_t count = 0;
@@ -349,38 +358,46 @@ TEST(UnitTestRecording, HostileLengthsAndContents)
 {
   const std::string bytes = Recorded(TestInputs(10));
   const std::string header = bytes.substr(0, HeaderSize(bytes));
-  const auto ends = [&](const std::string& chunks)
+  const auto ends = [&](const std::string& blocks)
   {
     std::vector<RecordedItem> items;
     Ending ending = Ending::NotYet;
-    EXPECT_TRUE(ReadAll(header + chunks, items, ending));
+    EXPECT_TRUE(ReadAll(header + blocks, items, ending));
     return ending;
   };
+  const auto endsWith = [&](const std::string& items) { return ends(Block(items)); };
   EXPECT_EQ(ends(""), Ending::Torn);
-  EXPECT_EQ(ends(std::string(4, '\xFF') + std::string(9, '\0')), Ending::Damaged);      // 4 GB
-  EXPECT_EQ(ends(std::string("\0\0\x10\0\6", 5) + std::string(8, '\0')), Ending::Torn); // 1 MB
-  EXPECT_EQ(ends(Chunk(1, 0, std::string(20, '\xFF'))), Ending::Damaged);        // endless varint
-  EXPECT_EQ(ends(Chunk(1, 0, std::string("\0\0", 2))), Ending::Damaged);         // no axis
-  EXPECT_EQ(ends(Chunk(1, 0, std::string("\0\x80\x20\0", 4))), Ending::Damaged); // unknown axis
-  EXPECT_EQ(ends(Chunk(1, 0, std::string("\0\1", 2))), Ending::Damaged);         // no value
-  EXPECT_EQ(ends(Chunk(4, 0, "short")), Ending::Damaged);
-  EXPECT_EQ(ends(Chunk(4, std::uint64_t{ 1 } << 50, "12345678")), Ending::Damaged);
-  EXPECT_EQ(ends(Chunk(6, 5, "") + Chunk(6, 4, "")), Ending::Damaged); // back in time
-  EXPECT_EQ(ends(Chunk(7, 0, std::string(56, '\1'))), Ending::Damaged);
-  EXPECT_EQ(ends(Chunk(7, 0, std::string(56, '\0')) + "more"), Ending::Damaged);
-  EXPECT_EQ(ends(Chunk(7, 0, std::string(56, '\0'))), Ending::Complete);
+  EXPECT_EQ(ends(std::string(8, '\xFF')), Ending::Damaged);              // 4 GB
+  EXPECT_EQ(ends(std::string("\0\0\x10\0\0\0\x10\0", 8)), Ending::Torn); // 1 MB
+  EXPECT_EQ(endsWith(std::string(1500000, '\0')), Ending::Damaged);
+  EXPECT_EQ(ends(std::string("\4\0\0\0\4\0\0\0abcd", 12)), Ending::Damaged);
+  EXPECT_EQ(endsWith("short"), Ending::Damaged);
+  EXPECT_EQ(endsWith(std::string("\6\xFF\xFF\xFF\xFF", 5) + std::string(8, '\0')), Ending::Damaged);
+  EXPECT_EQ(endsWith(Item(1, 0, "")), Ending::Damaged);
+  EXPECT_EQ(endsWith(Item(1, 0, std::string("\0\0", 2))), Ending::Damaged);     // no axis
+  EXPECT_EQ(endsWith(Item(1, 0, std::string("\0\x10", 2))), Ending::Damaged);   // unknown axis
+  EXPECT_EQ(endsWith(Item(1, 0, std::string("\1\0abcd", 6))), Ending::Damaged); // half a value
+  EXPECT_EQ(endsWith(Item(4, 0, "short")), Ending::Damaged);
+  EXPECT_EQ(endsWith(Item(4, std::uint64_t{ 1 } << 50, "12345678")), Ending::Damaged);
+  EXPECT_EQ(endsWith(Item(6, 5, "") + Item(6, ~std::uint64_t{ 0 }, "")), Ending::Damaged); // back
+  const std::string noEnd = Item(7, 0, std::string(56, '\1'));
+  const std::string end = Item(7, 0, std::string(56, '\0'));
+  EXPECT_EQ(endsWith(noEnd), Ending::Damaged);
+  EXPECT_EQ(endsWith(end + end), Ending::Damaged);
+  EXPECT_EQ(ends(Block(end) + "more"), Ending::Damaged);
+  EXPECT_EQ(endsWith(end), Ending::Complete);
 
   // Headers.
   std::vector<RecordedItem> items;
   Ending ending = Ending::NotYet;
   EXPECT_FALSE(ReadAll("", items, ending));
   EXPECT_FALSE(ReadAll("PCIREC", items, ending));
-  EXPECT_FALSE(ReadAll(std::string("PCIREC\0\2\0\0\0\0", 12), items, ending));
-  EXPECT_FALSE(ReadAll(std::string("PCIREC\0\1\xFF\xFF\xFF\xFF", 12), items, ending));
-  EXPECT_FALSE(ReadAll(std::string("PCIREC\0\1\0\0\0\1{}", 14), items, ending)); // 16 MB
-  EXPECT_FALSE(ReadAll(std::string("PCIREC\0\1\2\0\0\0{}", 14), items, ending));
+  EXPECT_FALSE(ReadAll(std::string("PCIREC\0\1\0\0\0\0", 12), items, ending));
+  EXPECT_FALSE(ReadAll(std::string("PCIREC\0\2\xFF\xFF\xFF\xFF", 12), items, ending));
+  EXPECT_FALSE(ReadAll(std::string("PCIREC\0\2\0\0\0\1{}", 14), items, ending)); // 16 MB
+  EXPECT_FALSE(ReadAll(std::string("PCIREC\0\2\2\0\0\0{}", 14), items, ending));
   std::string deep(100000, '[');
-  std::string nested("PCIREC\0\1", 8);
+  std::string nested("PCIREC\0\2", 8);
   nested += std::string("\xA0\x86\1\0", 4) + deep;
   EXPECT_FALSE(ReadAll(nested, items, ending));
   std::string other = bytes;

@@ -1,7 +1,6 @@
 // Tetrahedral meshes: closed forms, the skeleton inside, refusals with their places, and workers that
 // crash, hang, leave or talk nonsense.
 #include "TetrahedralMesh.h"
-#include "TriangleTree.h"
 
 #include <gtest/gtest.h>
 
@@ -325,38 +324,6 @@ TEST(TetrahedronQuality, OfACornerAndOfASliver)
   EXPECT_NEAR(
     coronary::MinimumDihedralAngle(o, Vector3(1, 0, 0), Vector3(0, 1, 0), Vector3(0, 0, 0.01)),
     std::atan(0.01 * std::sqrt(2.0)), 1e-12);
-}
-
-TEST(TriangleTree, NearestPointAndWinding)
-{
-  const TetrahedralMeshInput sphere = Sphere(2.0, 12, Vector3(1, 2, 3));
-  const coronary::TriangleTree tree(sphere.points, sphere.triangles);
-  for (int i = 0; i < 200; ++i)
-  {
-    const Vector3 p = Vector3(1, 2, 3) +
-      3.0 * Vector3(std::sin(1.7 * i), std::sin(2.3 * i + 1.0), std::sin(3.1 * i + 2.0));
-    double best = 1e9;
-    for (const Triangle& t : sphere.triangles)
-    {
-      best = std::min(best,
-        (coronary::ClosestPointOfTriangle(
-           p, sphere.points[t[0]], sphere.points[t[1]], sphere.points[t[2]]) -
-          p)
-          .norm());
-    }
-    EXPECT_DOUBLE_EQ(tree.Closest(p).distance, best);
-    const double radius = (p - Vector3(1, 2, 3)).norm();
-    if (std::abs(radius - 2.0) > 0.1)
-    {
-      EXPECT_EQ(tree.Winding(p), radius < 2.0 ? 1 : 0);
-    }
-  }
-  // Straight below points and edges of the mesh.
-  for (const Vector3& p : sphere.points)
-  {
-    EXPECT_EQ(tree.Winding(Vector3(1, 2, 3) + 0.5 * (p - Vector3(1, 2, 3))), 1);
-    EXPECT_EQ(tree.Winding(Vector3(p[0], p[1], -5.0)), 0);
-  }
 }
 
 TEST_F(TetGen, FillsABox)

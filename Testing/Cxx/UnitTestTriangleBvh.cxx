@@ -192,36 +192,6 @@ TEST_P(WithInstructions, AHintNeverChangesTheResult)
   }
 }
 
-TEST_P(WithInstructions, RefitFollowsThePoints)
-{
-  Soup soup = MakeSoup(1500, 11);
-  TriangleBvh tree(soup.points, soup.triangles);
-  for (Vector3& p : soup.points)
-  {
-    p = Vector3(1.3 * p[0] + std::sin(p[1]), p[1] - 0.2 * p[2] * p[2], p[2] + 20.0);
-  }
-  tree.Refit(soup.points);
-  const std::vector<Vector3> places = Places(200, 3, { 0, 0, 20 });
-  for (const Vector3& p : places)
-  {
-    ASSERT_NEAR(tree.Closest(p).distance, BruteForce(soup, p), 1e-10);
-  }
-  std::vector<float> single;
-  for (Vector3& p : soup.points)
-  {
-    for (double& coordinate : p)
-    {
-      single.push_back(static_cast<float>(coordinate));
-      coordinate = single.back();
-    }
-  }
-  tree.Refit(single);
-  for (const Vector3& p : places)
-  {
-    ASSERT_NEAR(tree.Closest(p).distance, BruteForce(soup, p), 1e-10);
-  }
-}
-
 INSTANTIATE_TEST_SUITE_P(TriangleBvh, WithInstructions,
   testing::Values(Instructions::Baseline, Instructions::Avx2),
   [](const auto& test) { return test.param == Instructions::Baseline ? "Baseline" : "Avx2"; });
@@ -255,6 +225,68 @@ TEST(TriangleBvh, WindingTellsInsideFromOutside)
   EXPECT_EQ(tree.Winding({ 0.5, 0, 0 }), 1);
 }
 
+TEST(NearestOnTriangle, IsNearerThanAllOtherPlaces)
+{
+  const Soup soup = MakeSoup(300, 23);
+  const std::vector<Vector3> places = Places(20, 24);
+  for (const Triangle& t : soup.triangles)
+  {
+    const Vector3& a = soup.points[t[0]];
+    const Vector3 ab = soup.points[t[1]] - a;
+    const Vector3 ac = soup.points[t[2]] - a;
+    for (const Vector3& p : places)
+    {
+      const TrianglePoint found = NearestOnTriangle(p, a, soup.points[t[1]], soup.points[t[2]]);
+      ASSERT_NEAR((found.point - p).squaredNorm(), found.squaredDistance, 1e-11);
+      ASSERT_NEAR((a + found.b * ab + found.c * ac - found.point).norm(), 0.0, 1e-12);
+      ASSERT_GE(std::min({ found.b, found.c, 1.0 - found.b - found.c }), -1e-12);
+      for (int i = 0; i <= 20; ++i)
+      {
+        for (int j = 0; i + j <= 20; ++j)
+        {
+          ASSERT_GE(
+            (a + 0.05 * i * ab + 0.05 * j * ac - p).squaredNorm(), found.squaredDistance - 1e-10);
+        }
+      }
+    }
+  }
+}
+
+TEST(TriangleBvh, VisitsWhatMeetsABox)
+{
+  const Soup soup = MakeSoup(2000, 17);
+  const TriangleBvh tree(soup.points, soup.triangles);
+  for (const Vector3& p : Places(50, 9))
+  {
+    const Vector3 low = p - Vector3(0.3, 0.8, 1.5);
+    const Vector3 high = p + Vector3(0.5, 0.2, 0.7);
+    std::vector<std::int64_t> wanted;
+    for (std::size_t i = 0; i < soup.triangles.size(); ++i)
+    {
+      const Triangle& t = soup.triangles[i];
+      const auto side = [&](int axis, auto choose) {
+        return choose(
+          { soup.points[t[0]][axis], soup.points[t[1]][axis], soup.points[t[2]][axis] });
+      };
+      bool meets = true;
+      for (int axis = 0; axis < 3; ++axis)
+      {
+        meets = meets &&
+          side(axis, [](std::initializer_list<double> v) { return std::min(v); }) <= high[axis] &&
+          side(axis, [](std::initializer_list<double> v) { return std::max(v); }) >= low[axis];
+      }
+      if (meets)
+      {
+        wanted.push_back(static_cast<std::int64_t>(i));
+      }
+    }
+    std::vector<std::int64_t> found;
+    tree.Visit(low, high, [&](std::int64_t triangle) { found.push_back(triangle); });
+    std::sort(found.begin(), found.end());
+    ASSERT_EQ(found, wanted);
+  }
+}
+
 TEST(TriangleBvh, EmptyAndBadInput)
 {
   EXPECT_EQ(TriangleBvh().Closest({ 0, 0, 0 }).triangle, -1);
@@ -262,13 +294,11 @@ TEST(TriangleBvh, EmptyAndBadInput)
   EXPECT_EQ(TriangleBvh().Winding({ 0, 0, 0 }), 0);
   const std::vector<Vector3> points = { { 0, 0, 0 }, { 1, 0, 0 }, { 0, 1, 0 } };
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  TriangleBvh tree(points, { { 0, 1, 2 } });
+  const TriangleBvh tree(points, { { 0, 1, 2 } });
   EXPECT_EQ(tree.Closest({ nan, 0, 0 }).triangle, -1);
   EXPECT_EQ(tree.Closest({ 1e30, 0, 0 }).triangle, -1);
   ExpectRefusal([&] { TriangleBvh(points, { { 0, 1, 3 } }); }, "refers to point 3 of 3");
   ExpectRefusal([&] { TriangleBvh({ { nan, 0, 0 } }, { { 0, 0, 0 } }); }, "not finite");
-  ExpectRefusal([&] { tree.Refit(std::vector<Vector3>(2)); }, "needs 3 points");
-  ExpectRefusal([&] { tree.Refit(std::vector<float>(3)); }, "needs 9 coordinates");
   // A point that no triangle uses may be anything.
   EXPECT_NO_THROW(TriangleBvh({ { 0, 0, 0 }, { nan, nan, nan } }, { { 0, 0, 0 } }));
 }

@@ -45,7 +45,12 @@ GuideCatheter Guide(std::vector<CatheterArc> shape, double friction, double leng
 
 double TurnOf(const GuideCatheter& guide)
 {
-  return guide.TurnedAngle(guide.length);
+  double angle = 0.0;
+  for (const CatheterArc& arc : guide.shape)
+  {
+    angle += std::abs(arc.curvature) * arc.length;
+  }
+  return angle;
 }
 
 /// Slides until all friction is that of sliding. The far end turns freely.

@@ -11,6 +11,8 @@
 #include <memory>
 #include <sstream>
 
+#include <zlib.h>
+
 using namespace coronary;
 
 namespace fuzzing
@@ -133,37 +135,38 @@ std::vector<std::string> RecordingSeeds()
   return { SmallRecording(true), SmallRecording(false) };
 }
 
-/// Chunks with right check sums: bytes of type, tick after the last one, size, payload.
-void ReadChunks(const std::string& bytes)
+/// Items in a block that is well packed: bytes of type, ticks after the last one, size, payload.
+void ReadItemsOfABlock(const std::string& bytes)
 {
-  static const std::string head = SmallRecording(false);
-  std::string recording = head;
-  std::uint64_t tick = 0;
+  std::string items;
+  const auto put = [](std::string& to, std::uint64_t value, int size)
+  {
+    for (int n = 0; n < size; ++n)
+    {
+      to.push_back(static_cast<char>(value >> (8 * n)));
+    }
+  };
   for (std::size_t at = 0; at + 3 <= bytes.size();)
   {
-    const char type = bytes[at];
-    tick += static_cast<unsigned char>(bytes[at + 1]);
     const std::string payload = bytes.substr(at + 3, static_cast<unsigned char>(bytes[at + 2]));
+    items.push_back(bytes[at]);
+    put(items, payload.size(), 4);
+    put(items, static_cast<unsigned char>(bytes[at + 1]), 8);
+    items += payload;
     at += 3 + payload.size();
-    std::string chunk;
-    const auto put = [&](std::uint64_t value, int size)
-    {
-      for (int n = 0; n < size; ++n)
-      {
-        chunk.push_back(static_cast<char>(value >> (8 * n)));
-      }
-    };
-    put(payload.size(), 4);
-    chunk.push_back(type);
-    put(tick, 8);
-    chunk += payload;
-    put(Crc32(chunk.data(), chunk.size()), 4);
-    recording += chunk;
   }
-  ReadRecording(recording);
+  uLongf size = compressBound(static_cast<uLong>(items.size()));
+  std::string packed(size, '\0');
+  compress2(reinterpret_cast<Bytef*>(packed.data()), &size,
+    reinterpret_cast<const Bytef*>(items.data()), static_cast<uLong>(items.size()), 1);
+  packed.resize(size);
+  std::string recording = SmallRecording(false);
+  put(recording, size, 4);
+  put(recording, items.size(), 4);
+  ReadRecording(recording + packed);
 }
 
-std::vector<std::string> ChunkSeeds()
+std::vector<std::string> ItemSeeds()
 {
   const std::string force("\2\0\x10"
                           "0123456789abcdef",
@@ -171,7 +174,7 @@ std::vector<std::string> ChunkSeeds()
   const std::string event("\3\0\x09\1"
                           "\0\0\0\0\0\0\x40\x40",
     12);
-  const std::string input("\1\1\6\0\1\4\2\3\4", 9);
+  const std::string input("\1\1\x0A\1\0\0\0\0\0\0\0\x40\x40", 13);
   const std::string hash("\4\1\x08"
                          "01234567",
     11);
@@ -203,7 +206,7 @@ std::vector<Harness> SessionHarnesses()
     { "drive-script", ReadScript, ScriptSeeds },
     { "instruments", ReadCatalogueText, CatalogueSeeds },
     { "recording", ReadRecording, RecordingSeeds },
-    { "recording-chunks", ReadChunks, ChunkSeeds },
+    { "recording-items", ReadItemsOfABlock, ItemSeeds },
     { "device-scenario", ReadDeviceScenarioText, DeviceScenarioSeeds },
   };
 }

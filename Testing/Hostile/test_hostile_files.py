@@ -261,9 +261,9 @@ def others():
     replay = ["--headless", "--output", "OUT", "--replay", "FILE"]
     yield Case("empty.pcirec", b"", replay, "simulator")
     yield Case("random.pcirec", bytes(range(256)), replay, "simulator")
-    yield Case("claim.pcirec", b"PCIREC\0\1" + struct.pack("<I", 0xFFFFFFFF), replay, "simulator")
+    yield Case("claim.pcirec", b"PCIREC\0\2" + struct.pack("<I", 0xFFFFFFFF), replay, "simulator")
     deep = b"[" * 100000
-    yield Case("deep.pcirec", b"PCIREC\0\1" + struct.pack("<I", len(deep)) + deep, replay, "simulator")
+    yield Case("deep.pcirec", b"PCIREC\0\2" + struct.pack("<I", len(deep)) + deep, replay, "simulator")
 
 
 def json_cases(kind, command, program, start):

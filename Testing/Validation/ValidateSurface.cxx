@@ -6,8 +6,8 @@
 #include "PhantomCases.h"
 #include "SurfaceMeasures.h"
 #include "SweepSurface.h"
+#include "TriangleBvh.h"
 #include "TriangleIntersections.h"
-#include "TriangleTree.h"
 
 #include <CLI/CLI.hpp>
 
@@ -119,7 +119,7 @@ std::vector<Vector3> EndNormals(const VesselTree& tree, const PhantomSurface& wa
   return normals;
 }
 
-void Distances(const std::vector<Vector3>& from, const TriangleTree& to, double& mean,
+void Distances(const std::vector<Vector3>& from, const TriangleBvh& to, double& mean,
   double& maximum, Vector3& where)
 {
   std::vector<double> distance(from.size());
@@ -197,9 +197,9 @@ Outcome Run(std::uint64_t seed, bool varied, double spacing, bool cut,
     std::max<double>(1.0, static_cast<double>(edges.size()));
   Vector3 there = Vector3::Zero();
   Vector3 back = Vector3::Zero();
-  Distances(surface.points, TriangleTree(wall.points, wall.triangles), outcome.meanThere,
+  Distances(surface.points, TriangleBvh(wall.points, wall.triangles), outcome.meanThere,
     outcome.maximumThere, there);
-  Distances(wall.points, TriangleTree(surface.points, surface.triangles), outcome.meanBack,
+  Distances(wall.points, TriangleBvh(surface.points, surface.triangles), outcome.meanBack,
     outcome.maximumBack, back);
   outcome.volumeError =
     outcome.measures.volume / MeasureSurface(wall.points, wall.triangles).volume - 1.0;

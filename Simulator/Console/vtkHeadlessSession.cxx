@@ -1,0 +1,642 @@
+#include "HeadlessSession.h"
+
+#include "AtomicFile.h"
+#include "FileSeries.h"
+#include "InstrumentCatalogue.h"
+#include "Interruption.h"
+#include "Program.h"
+#include "ProgressDisplay.h"
+#include "SessionImager.h"
+#include "SessionPictures.h"
+#include "SessionRunner.h"
+#include "SessionStatistics.h"
+#include "StagedFolder.h"
+#include "UtcTime.h"
+#include "vtkMessageTrap.h"
+#include "vtkSessionFiles.h"
+
+#include <nlohmann/json.hpp>
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+namespace coronary
+{
+namespace
+{
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+constexpr std::int64_t InterruptionInterval = 64; // ticks between looks at signals
+constexpr std::uint64_t MostPrinted = 50; // messages on the console; statistics.json has more
+
+/// Whether it is a name as wire_00012.vtp.
+bool IsNumbered(const std::string& name, const std::string& start, const std::string& end)
+{
+  const std::size_t digits = start.size();
+  return name.size() > digits + end.size() && name.rfind(start, 0) == 0 &&
+    name.compare(name.size() - end.size(), end.size(), end) == 0 &&
+    name.find_first_not_of("0123456789", digits) == name.size() - end.size();
+}
+
+Json MetricsToJson(const SessionMetrics& metrics, const WallTopology& topology)
+{
+  Json branches = Json::array();
+  for (const int branch : metrics.branches)
+  {
+    const auto n = static_cast<std::size_t>(branch);
+    const std::string name = n < topology.groupName.size() ? topology.groupName[n] : "";
+    // Parts of one segment between its side branches are one for people.
+    if (branches.empty() || branches.back() != name)
+    {
+      branches.push_back(name);
+    }
+  }
+  return { { "procedure_s", metrics.procedureSeconds },
+    { "fluoroscopy_s", metrics.fluoroscopySeconds }, { "cine_s", metrics.cineSeconds },
+    { "frames", metrics.frames }, { "air_kerma_mGy", metrics.airKerma },
+    { "dose_area_Gy_cm2", metrics.doseAreaProduct }, { "contrast_mL", metrics.contrast },
+    { "greatest_wall_force_N", metrics.maximumWallForce },
+    { "greatest_tip_force_N", metrics.maximumTipForce },
+    { "forceful_tip_s", metrics.forcefulSeconds }, { "wire_travel_mm", metrics.wireTravel },
+    { "wire_turning_rad", metrics.wireTurning }, { "deepest_mm", metrics.deepest },
+    { "path", branches } };
+}
+
+/// Everything that goes into the folder.
+class OutputFiles
+{
+public:
+  OutputFiles(const HeadlessOptions& options, const WallTopology& topology)
+  {
+    if (options.output.empty())
+    {
+      return;
+    }
+    this->Folder = std::make_unique<StagedFolder>(options.output);
+    this->TakeOlder(options.output);
+    if (options.writeWall)
+    {
+      this->Wall = std::make_unique<vtkWallFiles>(topology);
+    }
+    this->Forces =
+      "tick,seconds,phase,inserted_mm,proximal_force_N,proximal_torque_N_mm,tip_force_N,"
+      "greatest_force_N,contacts,largest_penetration_mm,mean_penetration_mm,joint_gap_mm,"
+      "outside,branch\n";
+    this->Flows = "tick,seconds,injection_mL_s,injected_mL,in_tree_mL,blush_mL,washed_out_mL,"
+                  "spilled_mL,aortic_pressure_mmHg,air_kerma_mGy,dose_area_Gy_cm2\n";
+    this->Tips = "tick,seconds,x_mm,y_mm,z_mm,direction_x,direction_y,direction_z\n";
+  }
+
+  explicit operator bool() const { return this->Folder != nullptr; }
+
+  void Add(const TrainingSession& session, const Scenario& scenario, vtkMessageTrap& messages)
+  {
+    const Intervention& intervention = session.Instruments();
+    const WallTopology& topology = session.Topology();
+    const TickReport& report = intervention.Report();
+    const double seconds = static_cast<double>(this->Tick) / scenario.settings.tickRate;
+    char name[40];
+    std::snprintf(name, sizeof(name), "wire_%05zu.vtp", this->WireFiles.size());
+    WriteInstruments(
+      this->Folder->Add(name), intervention, scenario.wire, scenario.catheter, messages);
+    this->WireFiles.push_back({ name, seconds });
+    if (this->Wall)
+    {
+      std::snprintf(name, sizeof(name), "wall_%05zu.vtp", this->WallFiles.size());
+      this->Wall->Write(this->Folder->Add(name), intervention.WallPoints(), messages);
+      this->WallFiles.push_back({ name, seconds });
+    }
+    char text[512];
+    const auto branch = static_cast<std::size_t>(report.branch);
+    const bool named = report.branch >= 0 && branch < topology.groupName.size();
+    std::snprintf(text, sizeof(text),
+      "%llu,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%d,%.9g,%.9g,%.9g,%d,%s\n",
+      static_cast<unsigned long long>(this->Tick), seconds, report.phase, report.inserted,
+      report.proximalForce, report.proximalTorque, report.tipForce, report.maximumForce,
+      report.contacts, report.maximumPenetration, report.meanPenetration, report.jointGap,
+      report.outside, named ? topology.groupName[branch].c_str() : "");
+    this->Forces += text;
+    const ContrastBalance medium = session.Contrast().Balance();
+    std::snprintf(text, sizeof(text), "%llu,%.9g,%.6g,%.9g,%.9g,%.9g,%.9g,%.9g,%.6g,%.6g,%.6g\n",
+      static_cast<unsigned long long>(this->Tick), seconds, session.Report().injection,
+      medium.injected, medium.inTree, medium.blush, medium.washedOut, medium.spilled,
+      session.Contrast().AorticPressure(), session.Metrics().airKerma,
+      session.Metrics().doseAreaProduct);
+    this->Flows += text;
+    const std::vector<Vector3>& line = intervention.Centerline();
+    if (line.size() > 1)
+    {
+      const Vector3 ahead = (line[0] - line[1]).normalized();
+      std::snprintf(text, sizeof(text), "%llu,%.9g,%.9g,%.9g,%.9g,%.6g,%.6g,%.6g\n",
+        static_cast<unsigned long long>(this->Tick), seconds, line[0].x(), line[0].y(), line[0].z(),
+        ahead.x(), ahead.y(), ahead.z());
+      this->Tips += text;
+    }
+  }
+
+  void SetTick(std::uint64_t tick) { this->Tick = tick; }
+
+  /// For files that others write.
+  std::string Place(const std::string& name) { return this->Folder->Add(name); }
+
+  void Finish(const Json& statistics, const SessionPictures& pictures)
+  {
+    if (pictures.Frames() > 0)
+    {
+      WriteFileAtomically(this->Folder->Add("frames.csv"), pictures.FrameTable());
+    }
+    WriteFileAtomically(this->Folder->Add("contrast.csv"), this->Flows);
+    WriteFileAtomically(this->Folder->Add("trajectory.pvd"), PvdText(this->WireFiles));
+    if (this->Wall)
+    {
+      WriteFileAtomically(this->Folder->Add("wall.pvd"), PvdText(this->WallFiles));
+    }
+    WriteFileAtomically(this->Folder->Add("tip.csv"), this->Tips);
+    WriteFileAtomically(this->Folder->Add("forces.csv"), this->Forces);
+    WriteFileAtomically(this->Folder->Add("statistics.json"), statistics.dump(2) + "\n");
+    this->Folder->Commit();
+  }
+
+private:
+  /// What an older session left under our names.
+  void TakeOlder(const std::string& folder)
+  {
+    std::vector<std::string> older;
+    std::error_code ignored;
+    for (const auto& entry : fs::directory_iterator(folder, ignored))
+    {
+      const std::string name = entry.path().filename().string();
+      if (IsNumbered(name, "wire_", ".vtp") || IsNumbered(name, "wall_", ".vtp") ||
+        IsNumbered(name, "xray_", ".png") || IsNumbered(name, "scene_", ".png") ||
+        name == "wall.pvd" || name == "frames.csv")
+      {
+        older.push_back(name);
+      }
+    }
+    this->Folder->TakePlaceOf(older);
+  }
+
+  std::unique_ptr<StagedFolder> Folder;
+  std::unique_ptr<vtkWallFiles> Wall;
+  std::vector<TimedFile> WireFiles;
+  std::vector<TimedFile> WallFiles;
+  std::string Forces;
+  std::string Flows;
+  std::string Tips;
+  std::uint64_t Tick = 0;
+};
+
+void Warn(const std::string& text)
+{
+  std::fprintf(stderr, "Warning: %s\n", text.c_str());
+}
+
+/// Before anything is put in its place: what is not verified leaves nothing.
+void FinishComparison(
+  const HeadlessOptions& options, const RecordingReader& reader, const HashComparison& comparison)
+{
+  const RecordingReader::Ending ending = reader.HowEnded();
+  const bool broken =
+    ending == RecordingReader::Ending::Torn || ending == RecordingReader::Ending::Damaged;
+  std::string problem;
+  if (comparison.firstDifference > 0)
+  {
+    problem = "The state after tick " + std::to_string(comparison.firstDifference) +
+      " is another one than in '" + options.replay + "' (" + std::to_string(comparison.equal) +
+      " of " + std::to_string(comparison.compared) + " hashes are equal).";
+  }
+  else if (broken)
+  {
+    problem = reader.EndingText() + ".";
+  }
+  else if (comparison.compared == 0 && options.verify)
+  {
+    problem = "'" + options.replay + "' has no hash of a state that could be verified.";
+  }
+  if (problem.empty())
+  {
+    return;
+  }
+  if (options.verify)
+  {
+    throw std::runtime_error(problem);
+  }
+  Warn(problem);
+}
+}
+
+void CheckRecording(const std::string& path, const Scenario& scenario, std::uint64_t wallHash,
+  bool otherVesselsAllowed)
+{
+  const RecordingReader reader(path);
+  const RecordingHeader& header = reader.Header();
+  if (header.tickRate != scenario.settings.tickRate)
+  {
+    throw std::runtime_error("'" + path + "' was recorded at " + std::to_string(header.tickRate) +
+      " Hz, the scenario has another tick rate.");
+  }
+  if (header.meshHash != wallHash)
+  {
+    const std::string text =
+      "'" + path + "' was recorded with other vessels or another motion of them";
+    if (!otherVesselsAllowed)
+    {
+      throw std::runtime_error(text + ".");
+    }
+    Warn(text + ".");
+  }
+}
+
+Scenario ScenarioOf(const HeadlessOptions& options)
+{
+  Scenario scenario;
+  if (!options.scenario.empty())
+  {
+    scenario = LoadScenario(options.scenario);
+  }
+  else if (!options.replay.empty())
+  {
+    const RecordingReader reader(options.replay);
+    scenario =
+      ScenarioFromText(reader.Header().scenario, "The scenario in '" + options.replay + "'", ".");
+  }
+  else
+  {
+    throw UsageError("--scenario is required (--list-scenarios names those that are built in)");
+  }
+  if (!options.vessels.empty())
+  {
+    if (scenario.vessels.kind == VesselSource::Kind::Phantom)
+    {
+      scenario.vessels.motion = VesselMotion::Automatic;
+    }
+    scenario.vessels.kind = VesselSource::Kind::Run;
+    scenario.vessels.path = fs::absolute(options.vessels).lexically_normal().string();
+  }
+  if (scenario.vessels.kind == VesselSource::Kind::Run && scenario.vessels.path.empty())
+  {
+    throw UsageError("--vessels is required: the scenario '" + scenario.name +
+      "' has no folder of its own with the result of 'coronary-pipeline run'");
+  }
+  if (!options.wire.empty())
+  {
+    scenario.wire = BuiltInCatalogue().Wire(options.wire).wire;
+  }
+  if (!options.catheter.empty())
+  {
+    scenario.catheter = BuiltInCatalogue().Catheter(options.catheter).catheter;
+  }
+  if (options.heartRate >= 0.0)
+  {
+    scenario.settings.heartRate = options.heartRate;
+  }
+  return scenario;
+}
+
+namespace
+{
+/// A session from its first tick to its last.
+class HeadlessRun
+{
+public:
+  /// @param replay  that the source goes through; null: none  @param expected  ticks; 0: not known before the end
+  HeadlessRun(const HeadlessOptions& options, const SessionWorld& world,
+    std::unique_ptr<TickSource> source, const RecordingReader* replay, std::uint64_t expected)
+    : Options(options)
+    , World(world)
+    , Replay(replay)
+    , Expected(expected)
+    , Rate(world.scenario.settings.tickRate)
+    , Runner(world.wall, world.scenario, world.wallHash, std::move(source))
+    , Pictures({ options.xray, options.scene }, world)
+    , Files(options, world.wall->Topology())
+    , Statistics(world.wall->Topology())
+    , Interval(
+        static_cast<std::uint64_t>(std::max(1.0, std::round(this->Rate / options.outputRate))))
+  {
+    this->Runner.maximumTicks = options.ticks;
+    this->Runner.say = [this](std::uint64_t tick, const std::string& text)
+    { this->Tell(tick, text); };
+    this->Runner.afterTick = [this](const SessionReport& report) { this->Keep(report); };
+    if (!options.record.empty())
+    {
+      this->Runner.Record(options.record, "coronary-simulator " DYNAMICCORONARY_VERSION, UtcTime());
+    }
+  }
+
+  void Run(ProgressDisplay& progress)
+  {
+    bool goesOn = true;
+    while (goesOn)
+    {
+      ThrowIfInterrupted();
+      if (this->Expected > 0)
+      {
+        progress.Update(
+          static_cast<double>(this->Runner.Tick()) / static_cast<double>(this->Expected));
+      }
+      const auto before = std::chrono::steady_clock::now();
+      goesOn = this->Runner.Run(InterruptionInterval);
+      this->Running += std::chrono::steady_clock::now() - before;
+    }
+    ThrowIfInterrupted();
+  }
+
+  void Finish()
+  {
+    if (this->Replay)
+    {
+      FinishComparison(this->Options, *this->Replay, this->Runner.Compared());
+    }
+    this->Runner.FinishRecording();
+    if (this->Files)
+    {
+      this->Files.Finish(this->Result(), this->Pictures);
+    }
+  }
+
+  void PrintSummary() const
+  {
+    for (const std::string& note : this->World.notes)
+    {
+      Warn(note);
+    }
+    std::string branches;
+    for (const std::string& name : this->Statistics.Branches())
+    {
+      branches += (branches.empty() ? "" : ", ") + name;
+    }
+    std::printf(
+      "%s: %llu ticks, %.3g s; greatest penetration %.3g mm; %llu messages; branches: %s\n",
+      this->World.scenario.name.c_str(), static_cast<unsigned long long>(this->Runner.Tick()),
+      static_cast<double>(this->Runner.Tick()) / this->Rate, this->Statistics.MaximumPenetration(),
+      static_cast<unsigned long long>(this->Statistics.Messages()),
+      branches.empty() ? "none" : branches.c_str());
+    const SessionMetrics& metrics = this->Runner.Session().Metrics();
+    if (metrics.frames > 0 || metrics.contrast > 0.0)
+    {
+      std::printf("%lld X-ray frames, %.3g mGy, %.3g Gy cm2; %.3g mL of contrast medium\n",
+        static_cast<long long>(metrics.frames), metrics.airKerma, metrics.doseAreaProduct,
+        metrics.contrast);
+    }
+    const double seconds = std::chrono::duration<double>(this->Running - this->Keeping).count();
+    if (this->Runner.Tick() > 0 && seconds > 0.0)
+    {
+      std::printf("%.3g us a tick, %.3g times real time\n",
+        1e6 * seconds / static_cast<double>(this->Runner.Tick()),
+        static_cast<double>(this->Runner.Tick()) / this->Rate / seconds);
+    }
+    if (this->Replay)
+    {
+      std::printf("%llu of %llu hashes are equal\n",
+        static_cast<unsigned long long>(this->Runner.Compared().equal),
+        static_cast<unsigned long long>(this->Runner.Compared().compared));
+    }
+  }
+
+private:
+  void Keep(const SessionReport& report)
+  {
+    const auto before = std::chrono::steady_clock::now();
+    const std::uint64_t tick = this->Runner.Tick();
+    this->Statistics.Add(report.tick);
+    if (tick % RecordedHashInterval == 0)
+    {
+      this->Hashes.push_back(Hexadecimal(this->Runner.StateHash()));
+    }
+    SessionPictures::FolderCallback folder;
+    if (this->Files)
+    {
+      folder = [this](const std::string& name) { return this->Files.Place(name); };
+    }
+    if (report.exposed)
+    {
+      this->Pictures.AddFrame(this->Runner.Session(), folder, this->Runner.Recording());
+    }
+    if (this->Files && (tick - 1) % this->Interval == 0)
+    {
+      this->Files.SetTick(tick);
+      this->Files.Add(this->Runner.Session(), this->World.scenario, this->Trap);
+      this->Pictures.AddScene(this->Runner.Session(), folder);
+    }
+    this->Keeping += std::chrono::steady_clock::now() - before;
+  }
+
+  void Tell(std::uint64_t tick, const std::string& text)
+  {
+    this->Statistics.AddMessage(tick, text);
+    if (!this->Options.quiet && this->Statistics.Messages() <= MostPrinted)
+    {
+      std::fprintf(stderr, "tick %llu: %s\n", static_cast<unsigned long long>(tick), text.c_str());
+    }
+  }
+
+  Json Result()
+  {
+    const WallTopology& topology = this->Runner.Session().Topology();
+    const Scenario& scenario = this->World.scenario;
+    Json result = this->Statistics.ToJson();
+    result["program"] = "coronary-simulator " DYNAMICCORONARY_VERSION;
+    result["scenario"] = scenario.name;
+    result["motion"] = this->World.motion;
+    result["notes"] = this->World.notes;
+    result["wire"] = scenario.wire.name;
+    result["catheter"] = scenario.catheter.name;
+    result["tick_hz"] = this->Rate;
+    result["seconds"] = static_cast<double>(this->Runner.Tick()) / this->Rate;
+    result["wall"] = { { "points", topology.points }, { "triangles", topology.triangles.size() },
+      { "hash", Hexadecimal(this->World.wallHash) } };
+    result["metrics"] = MetricsToJson(this->Runner.Session().Metrics(), topology);
+    result["state_hash_interval"] = RecordedHashInterval;
+    result["state_hashes"] = this->Hashes;
+    result["last_state_hash"] = Hexadecimal(this->Runner.StateHash());
+    if (this->Replay)
+    {
+      result["replay"] = { { "compared", this->Runner.Compared().compared },
+        { "equal", this->Runner.Compared().equal },
+        { "first_different_tick",
+          this->Runner.Compared().firstDifference > 0
+            ? Json(this->Runner.Compared().firstDifference)
+            : Json(nullptr) },
+        { "unknown_chunks", this->Replay->Unknown() },
+        { "unknown_events", this->Runner.UnknownEvents() } };
+    }
+    return result;
+  }
+
+  const HeadlessOptions& Options;
+  const SessionWorld& World;
+  const RecordingReader* Replay;
+  std::uint64_t Expected;
+  double Rate;
+  SessionRunner Runner;
+  SessionPictures Pictures;
+  OutputFiles Files;
+  SessionStatistics Statistics;
+  std::uint64_t Interval;
+  vtkMessageTrap Trap;
+  Json Hashes = Json::array();
+  std::chrono::steady_clock::duration Running{};
+  std::chrono::steady_clock::duration Keeping{}; // of files and pictures
+};
+}
+
+namespace
+{
+WorldProgress ShownBy(ProgressDisplay& progress)
+{
+  return
+    [&progress, step = -1, now = std::string()](const std::string& what, double fraction) mutable
+  {
+    if (what != now)
+    {
+      now = what;
+      progress.BeginStep(++step, what);
+    }
+    progress.Update(fraction);
+    return Interruption() == 0;
+  };
+}
+}
+
+void RunHeadless(const HeadlessOptions& options)
+{
+  const Scenario scenario = ScenarioOf(options);
+  const double rate = scenario.settings.tickRate;
+  const DriveScript script =
+    options.script.empty() ? DriveScript() : ReadDriveScript(options.script);
+  auto recorded = options.replay.empty() ? nullptr : std::make_unique<ReplaySource>(options.replay);
+  const RecordingReader* replay = recorded ? &recorded->Reader() : nullptr;
+  const auto expected = options.ticks > 0 || recorded ? options.ticks : script.Ticks(rate);
+  if (expected == 0 && !recorded)
+  {
+    throw UsageError(
+      "--ticks is required where neither --script nor --replay says how long it takes");
+  }
+  const int preparations = options.xray ? 2 : 1;
+  auto progress = std::make_unique<ProgressDisplay>("step", preparations + 1, options.quiet);
+  const SessionWorld world = LoadWorld(scenario, options.xray, ShownBy(*progress));
+  if (replay)
+  {
+    CheckRecording(options.replay, scenario, world.wallHash, !options.verify);
+  }
+  std::unique_ptr<TickSource> source = std::move(recorded);
+  if (!source)
+  {
+    source =
+      std::make_unique<ScriptSource>(script, StartInputOf(world.scenario), rate, options.ticks > 0);
+  }
+  HeadlessRun run(options, world, std::move(source), replay, expected);
+  progress->BeginStep(preparations, "simulation");
+  run.Run(*progress);
+  run.Finish();
+  progress.reset();
+  if (!options.quiet)
+  {
+    run.PrintSummary();
+  }
+}
+
+namespace
+{
+Json NameOfEvent(std::uint8_t kind)
+{
+  switch (kind)
+  {
+    case RecordedEvent::HeartRate:
+      return "heart_rate_bpm";
+    case RecordedEvent::FrameRate:
+      return "frame_rate_hz";
+    case RecordedEvent::FieldOfView:
+      return "field_of_view_mm";
+    default:
+      return static_cast<int>(kind);
+  }
+}
+}
+
+void DumpRecording(const std::string& path)
+{
+  RecordingReader reader(path);
+  const RecordingHeader& header = reader.Header();
+  const auto print = [](const Json& json)
+  { std::printf("%s\n", json.dump(-1, ' ', false, Json::error_handler_t::replace).c_str()); };
+  print({ { "type", "header" }, { "build", header.build },
+    { "scenario", Json::parse(header.scenario) }, { "mesh_hash", Hexadecimal(header.meshHash) },
+    { "seed", header.seed }, { "tick_hz", header.tickRate }, { "start_utc", header.started } });
+  RecordedItem item;
+  while (reader.Next(item))
+  {
+    ThrowIfInterrupted();
+    Json json = { { "tick", item.tick } };
+    switch (item.type)
+    {
+      case RecordType::Input:
+        json["type"] = "input";
+        json["wire_mm"] = item.input.drive.wirePosition;
+        json["wire_rad"] = item.input.drive.wireAngle;
+        json["catheter_mm"] = item.input.drive.catheterPosition;
+        json["catheter_rad"] = item.input.drive.catheterAngle;
+        json["syringe_mL"] = item.input.syringe;
+        json["pedals"] = item.input.pedals;
+        json["primary_rad"] = item.input.primary;
+        json["secondary_rad"] = item.input.secondary;
+        json["source_to_detector_mm"] = item.input.sourceToDetector;
+        json["table_mm"] = { item.input.table.x(), item.input.table.y(), item.input.table.z() };
+        break;
+      case RecordType::Force:
+        json["type"] = "force";
+        json["proximal_N"] = item.forces.proximalForce;
+        json["proximal_N_mm"] = item.forces.proximalTorque;
+        json["tip_N"] = item.forces.tipForce;
+        json["greatest_N"] = item.forces.maximumForce;
+        break;
+      case RecordType::Event:
+        json["type"] = "event";
+        json["kind"] = NameOfEvent(item.event.kind);
+        json["value"] = item.event.value;
+        break;
+      case RecordType::StateHash:
+      case RecordType::ImageHash:
+        json["type"] = item.type == RecordType::StateHash ? "state_hash" : "image_hash";
+        json["hash"] = Hexadecimal(item.hash);
+        break;
+      case RecordType::Annotation:
+        json["type"] = "annotation";
+        json["text"] = item.text;
+        break;
+      case RecordType::End:
+        json["type"] = "end";
+        json["ticks"] = item.counts[0];
+        break;
+    }
+    print(json);
+  }
+  if (reader.HowEnded() != RecordingReader::Ending::Complete)
+  {
+    throw std::runtime_error(reader.EndingText() + ".");
+  }
+}
+
+void ListInstruments()
+{
+  constexpr double GramForce = 9.80665e-3; // N
+  for (const CatalogueWire& one : BuiltInCatalogue().wires)
+  {
+    std::printf("wire      %-16s %4.1f gf  %s\n", one.wire.name.c_str(),
+      TipLoad(one.wire) / GramForce, one.description.c_str());
+  }
+  for (const CatalogueCatheter& one : BuiltInCatalogue().catheters)
+  {
+    std::printf("catheter  %-16s %4.2f mm  %s\n", one.catheter.name.c_str(),
+      2.0 * one.catheter.innerRadius, one.description.c_str());
+  }
+}
+}
