@@ -10,6 +10,7 @@
 #include <vtkSMProxy.h>
 
 #include <QApplication>
+#include <QTimer>
 
 coronaryFrameGuard::coronaryFrameGuard(QObject* parent)
   : QObject(parent)
@@ -27,6 +28,8 @@ void coronaryFrameGuard::Start()
   pqAnimationManager* manager = core ? core->animationManager() : nullptr;
   if (!manager)
   {
+    // ParaView 6 loads plugins while it makes what has the animation.
+    QTimer::singleShot(100, this, &coronaryFrameGuard::Start);
     return;
   }
   QObject::connect(

@@ -2,7 +2,7 @@
  * @class coronaryFrameGuard
  * @brief Keeps clicks and keys back while ParaView computes a frame that is not played.
  *
- * ParaView 5.11 handles what the user does while it is within the tick of a frame. A click on play that waits for
+ * ParaView handles what the user does while it is within the tick of a frame. A click on play that waits for
  * a slow frame then starts a tick within the tick, and the program aborts. Here such a click waits for the end of the frame.
  */
 #ifndef coronaryFrameGuard_h
