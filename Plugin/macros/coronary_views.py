@@ -12,7 +12,7 @@ WHITE = [1.0, 1.0, 1.0]
 # One after the other, for neighbours that can be told apart.
 SEGMENTS = [[0.84, 0.15, 0.16], [0.12, 0.47, 0.71], [0.17, 0.63, 0.17], [1.00, 0.50, 0.05], [0.58, 0.40, 0.74],
             [0.55, 0.34, 0.29], [0.89, 0.47, 0.76], [0.50, 0.50, 0.50], [0.74, 0.74, 0.13], [0.09, 0.75, 0.81]]
-PHASE = "{time:.0f} % of the R-R interval"
+PHASE = "{time:.0f} % R-R"
 RADIUS = "MaximumInscribedSphereRadius"
 # Of the names beside a tree: points of the font, and pixels a letter and a line of it take.
 NAME_SIZE, LETTER, LINE_HEIGHT = 15, 10.0, 18.0

@@ -12,12 +12,12 @@ from coronary_testing import require, require_picture
 FOLDER = os.environ["DYNAMICCORONARY_TEST_FOLDER"]
 
 
-def checker(look):
+def checker(look, settle=1.0):
     """The play-back's check(step): calls look(step), and lets play-back.sh know that it was right."""
     def check(step):
         try:
             # ParaView 6 lays views out, and shows what was made, after the script that did.
-            live(1.0)
+            live(settle)
             look(step)
             with open(os.path.join(FOLDER, "checked"), "a", encoding="utf-8") as file:
                 file.write(step + "\n")
