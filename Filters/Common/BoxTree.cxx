@@ -182,20 +182,15 @@ std::vector<BoxNode> BoxTree::EmptyNodes() const
 
 void BoxTree::FitAbove(std::vector<BoxNode>& nodes)
 {
+  using Lanes = Eigen::Array<float, BoxNode::Width, 1>;
   for (std::size_t n = nodes.size() - 1; n > 0; --n)
   {
     BoxNode& above = nodes[(n - 1) / BoxNode::Width];
     for (int k = 0; k < 3; ++k)
     {
-      float low = nodes[n].low[k][0];
-      float high = nodes[n].high[k][0];
-      for (int lane = 1; lane < BoxNode::Width; ++lane)
-      {
-        low = std::min(low, nodes[n].low[k][lane]);
-        high = std::max(high, nodes[n].high[k][lane]);
-      }
-      above.low[k][(n - 1) % BoxNode::Width] = low;
-      above.high[k][(n - 1) % BoxNode::Width] = high;
+      above.low[k][(n - 1) % BoxNode::Width] = Eigen::Map<const Lanes>(nodes[n].low[k]).minCoeff();
+      above.high[k][(n - 1) % BoxNode::Width] =
+        Eigen::Map<const Lanes>(nodes[n].high[k]).maxCoeff();
     }
   }
 }
