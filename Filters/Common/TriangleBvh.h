@@ -56,12 +56,19 @@ public:
   Nearest Closest(const Vector3& p, double bound = std::numeric_limits<double>::infinity(),
     std::int64_t hint = -1) const;
 
-  /// The nearest point of one of the triangles.
+  /// The nearest point of one of the triangles. A corner is a point of the surface to the last bit.
   TrianglePoint NearestOn(std::int64_t triangle, const Vector3& p) const
   {
     const std::array<std::int32_t, 3>& corners = this->Corners[triangle];
-    return NearestOnTriangle(
+    TrianglePoint on = NearestOnTriangle(
       p, this->Points[corners[0]], this->Points[corners[1]], this->Points[corners[2]]);
+    if (on.feature >= TriangleFeature::A)
+    {
+      on.point =
+        this->Points[corners[static_cast<int>(on.feature) - static_cast<int>(TriangleFeature::A)]];
+      on.squaredDistance = (p - on.point).squaredNorm();
+    }
+    return on;
   }
 
   /**
