@@ -13,6 +13,7 @@
 #include <cstring>
 #include <fstream>
 #include <istream>
+#include <new>
 #include <ostream>
 #include <stdexcept>
 #include <utility>
@@ -84,6 +85,27 @@ std::uint64_t Little(const char* bytes, int size)
     value |= static_cast<std::uint64_t>(static_cast<unsigned char>(bytes[n])) << (8 * n);
   }
   return value;
+}
+
+/// What packed bytes hold of a block of that size, as far as they go.
+/// @param whole  becomes whether all of it is there and its check sum fits
+std::string Unpacked(const std::string& packed, std::size_t size, bool& whole)
+{
+  std::string block(size, '\0');
+  z_stream inflating{};
+  if (inflateInit(&inflating) != Z_OK)
+  {
+    throw std::bad_alloc();
+  }
+  // zlib does not write to its input.
+  inflating.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data()));
+  inflating.avail_in = static_cast<uInt>(packed.size());
+  inflating.next_out = reinterpret_cast<Bytef*>(block.data());
+  inflating.avail_out = static_cast<uInt>(size);
+  whole = inflate(&inflating, Z_SYNC_FLUSH) == Z_STREAM_END && inflating.avail_out == 0;
+  block.resize(size - inflating.avail_out);
+  inflateEnd(&inflating);
+  return block;
 }
 
 std::uint64_t HexadecimalOf(JsonFields& fields, const char* name)
@@ -352,6 +374,7 @@ struct RecordingReader::Internals
   std::array<std::uint64_t, 8> counts{};
   std::string block; ///< that is being read
   std::size_t at = 0;
+  bool torn = false; ///< the block has a beginning only
 
   /// Up to `size` bytes, never more memory than there are bytes.
   std::string Take(std::size_t size)
@@ -382,6 +405,12 @@ struct RecordingReader::Internals
   }
 
   bool Damaged(const std::string& why) { return this->End(Ending::Damaged, why); }
+
+  bool BreaksOff()
+  {
+    return this->torn ? this->End(Ending::Torn, "its last block breaks off")
+                      : this->Damaged("an item breaks off");
+  }
 
   void Begin()
   {
@@ -436,16 +465,11 @@ struct RecordingReader::Internals
       return this->Damaged("a block says that it has " + std::to_string(size) + " bytes");
     }
     const std::string packed = this->Take(packedSize);
-    if (packed.size() < packedSize)
-    {
-      return this->End(Ending::Torn, "its last block breaks off");
-    }
-    this->block.assign(size, '\0');
+    bool whole = false;
+    this->block = Unpacked(packed, size, whole);
     this->at = 0;
-    uLongf got = size;
-    if (uncompress(reinterpret_cast<Bytef*>(this->block.data()), &got,
-          reinterpret_cast<const Bytef*>(packed.data()), packedSize) != Z_OK ||
-      got != size)
+    this->torn = packed.size() < packedSize;
+    if (!whole && !this->torn)
     {
       return this->Damaged("the check sum of a block does not fit");
     }
@@ -467,7 +491,7 @@ struct RecordingReader::Internals
       }
       if (this->block.size() - this->at < ItemHead)
       {
-        return this->Damaged("an item breaks off");
+        return this->BreaksOff();
       }
       const auto type = static_cast<std::uint8_t>(this->block[this->at]);
       const std::uint64_t size = Little(&this->block[this->at + 1], 4);
@@ -475,7 +499,7 @@ struct RecordingReader::Internals
       this->at += ItemHead;
       if (size > this->block.size() - this->at)
       {
-        return this->Damaged("an item breaks off");
+        return this->BreaksOff();
       }
       if (gap >= MostTicks || this->lastTick + gap >= MostTicks)
       {
@@ -491,6 +515,10 @@ struct RecordingReader::Internals
       }
       item.type = static_cast<RecordType>(type);
       item.tick = this->lastTick;
+      if (item.type == RecordType::End && this->torn)
+      {
+        return this->BreaksOff();
+      }
       if (!this->Decode(payload, item))
       {
         return false;

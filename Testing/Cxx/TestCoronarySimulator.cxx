@@ -194,7 +194,7 @@ TEST_F(TestCoronarySimulator, NoticesAnotherState)
     << bytes.substr(0, bytes.size() - 100);
   this->ExpectFailure(1, "--replay torn.pcirec --verify", "is good up to tick");
   EXPECT_EQ(this->Run("--headless --replay torn.pcirec --output f"), 0) << this->Said();
-  EXPECT_EQ(this->Statistics("f")["ticks"], 1000) << "the last block is lost";
+  EXPECT_GT(this->Statistics("f")["ticks"], 1000);
 }
 
 TEST_F(TestCoronarySimulator, DumpsRecordings)
