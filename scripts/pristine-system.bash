@@ -15,9 +15,9 @@ require_debootstrap() {
 
 # pristine_system SUITE LOG
 #   Makes a system of a suite of Debian or Ubuntu; its folder is then `system`. Its base is made once and kept in `systems`, a
-#   folder of the user's cache; what is put on top of it belongs to whoever asked, who deletes it.
+#   folder of the user's cache; what is put on top of it goes with the script, unless that has another trap for its end.
 pristine_system() {
-  local suite="$1" log="$2" made mirror="http://deb.debian.org/debian"
+  local suite="$1" log="$2" mirror="http://deb.debian.org/debian"
   local options=("--variant=minbase" "--include=git,ca-certificates")
   if [ "$suite" = noble ]; then
     mirror="http://archive.ubuntu.com/ubuntu"
@@ -25,6 +25,8 @@ pristine_system() {
     # Debian has no key of Ubuntu's archive unless ubuntu-keyring is installed.
     [ -f /usr/share/keyrings/ubuntu-archive-keyring.gpg ] || options+=(--no-check-gpg)
   fi
+  made="" system=""
+  trap 'rm -rf "$made" "$system"' EXIT
   systems="${XDG_CACHE_HOME:-${HOME:-/root}/.cache}/dynamiccoronary/systems"
   mkdir -p "$systems"
   if [ ! -d "$systems/$suite" ]; then
@@ -32,7 +34,6 @@ pristine_system() {
     made="$(mktemp -d "$systems/$suite.XXXXXX")"
     if ! debootstrap "${options[@]}" "$suite" "$made/root" "${DYNAMICCORONARY_MIRROR:-$mirror}" >>"$log" 2>&1; then
       tail -n 20 "$log" >&2
-      rm -rf "$made"
       echo "$(basename "$0" .sh): debootstrap could not make a system of $suite" >&2
       exit 1
     fi

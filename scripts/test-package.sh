@@ -20,7 +20,6 @@ fi
 
 mkdir -p "$root/build/logs"
 pristine_system "$suite" "$root/build/logs/test-package-$suite.log"
-trap 'rm -rf "$system"' EXIT
 cp "$package" "$system/root/package.deb"
 
 cat >"$system/root/use.sh" <<'EOF'
