@@ -12,6 +12,7 @@
 #include <array>
 #include <map>
 #include <set>
+#include <string>
 #include <tuple>
 
 namespace coronary
@@ -48,7 +49,7 @@ struct SweptLumen::Build
   std::map<std::int64_t, std::vector<Incidence>> incidences;
   std::map<std::int64_t, int> treeOfNode;
   std::vector<std::int64_t> extended;          ///< end points that were moved outwards
-  std::set<std::tuple<int, bool, int>> mended; ///< group, at its start, round
+  std::set<std::tuple<int, bool, std::string>> mended; ///< group, at its start, what was done
   /// Where vessels meet: numbers and arc lengths of the vessels, one for each first junction.
   struct Node
   {

@@ -191,9 +191,9 @@ std::unique_ptr<VesselAxis> SweptLumen::Build::MakeAxis(
       {
         break;
       }
-      // The vessels are made anew when a stub was mended; what is said of an end is said once.
+      // Rounds, and vessels that are made anew when a stub was mended, say the same of an end: once is enough.
       const int group = atStart ? firstGroup : lastGroup;
-      if (this->mended.insert({ group, atStart, round }).second)
+      if (this->mended.insert({ group, atStart, done }).second)
       {
         this->Repaired(group, done, place);
       }
