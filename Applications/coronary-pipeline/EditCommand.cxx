@@ -245,6 +245,7 @@ void EditCommand::Run()
   RunSettings settings;
   RunOptions options(parser, settings);
   options.Take(report["settings"], "'" + reportPath + "': settings");
+  settings.input = FindRunInput(settings.input, this->Folder);
   settings.output = this->Folder;
   settings.until = this->Until.empty() ? settings.until : this->Until;
   settings.threads = this->Threads;

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <stdexcept>
 
 namespace coronary
@@ -581,5 +582,30 @@ std::vector<std::string> RunOptions::NamesOf(RunStage stage) const
     }
   }
   return names;
+}
+
+std::vector<std::string> FindRunInput(std::vector<std::string> input, const std::string& run)
+{
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path folder = fs::weakly_canonical(fs::absolute(run, error), error);
+  for (std::string& path : input)
+  {
+    if (fs::exists(path, error) || fs::path(path).is_absolute())
+    {
+      continue;
+    }
+    fs::path above = folder;
+    while (above.has_relative_path())
+    {
+      above = above.parent_path();
+      if (fs::exists(above / path, error))
+      {
+        path = (above / path).string();
+        break;
+      }
+    }
+  }
+  return input;
 }
 }

@@ -134,6 +134,10 @@ private:
   RunSettings& Settings;
   std::vector<Setting> List;
 };
+
+/// A run's input as its report has it: relative paths are looked for here, then in the folders above the run's, nearest first.
+/// What is nowhere stays as it is.
+std::vector<std::string> FindRunInput(std::vector<std::string> input, const std::string& run);
 }
 
 #endif

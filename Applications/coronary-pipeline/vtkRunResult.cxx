@@ -1,6 +1,7 @@
 #include "vtkRunResult.h"
 
 #include "BoundedJson.h"
+#include "RunSettings.h"
 #include "TextFile.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
@@ -21,6 +22,7 @@
 #include <filesystem>
 #include <map>
 #include <stdexcept>
+#include <utility>
 
 namespace coronary
 {
@@ -85,24 +87,19 @@ void Prepare(ResultImage& image, vtkImageData* data)
     vtkCoronary::ScalarImageOf(data, data->GetPointData()->GetScalars(), image.copy));
 }
 
-/// As the report has them; relative ones also from where the folder lies.
+/// As the report has them, found again.
 std::vector<std::string> InputFiles(const RunResult& result)
 {
   std::vector<std::string> files;
   const Json input = Member(Member(result.report, "settings"), "input");
   for (const Json& one : input)
   {
-    if (!one.is_string())
+    if (one.is_string())
     {
-      continue;
+      files.push_back(one.get<std::string>());
     }
-    const fs::path path = one.get<std::string>();
-    std::error_code error;
-    const fs::path beside = fs::absolute(result.folder, error).parent_path() / path;
-    files.push_back(
-      !fs::exists(path, error) && fs::exists(beside, error) ? beside.string() : path.string());
   }
-  return files;
+  return FindRunInput(std::move(files), result.folder);
 }
 }
 

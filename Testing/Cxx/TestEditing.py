@@ -34,9 +34,9 @@ def check(condition, text):
         print("FAILED:", text)
 
 
-def run(*arguments, code=0, says=()):
+def run(*arguments, code=0, says=(), cwd=None):
     """Runs the program; a failure has to be one line with all of `says` in it, beside warnings."""
-    done = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=600, check=False)
+    done = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=600, check=False, cwd=cwd)
     check(done.returncode == code, f"{arguments}: exit code {done.returncode}: {done.stderr}")
     if code:
         errors = [line for line in done.stderr.splitlines() if not line.startswith("Warning: ")]
@@ -45,7 +45,8 @@ def run(*arguments, code=0, says=()):
 
 
 def edit(*arguments, **expected):
-    return run("edit", "run", *arguments, "--quiet", **expected)
+    """From another folder than the run was made in, whose input was given by a relative path."""
+    return run("edit", os.path.abspath("run"), *arguments, "--quiet", cwd="/", **expected)
 
 
 def text(point):
