@@ -784,6 +784,10 @@ void ExpectFewMissing(std::vector<LooseVessel>& vessels)
     }
     return sum;
   };
+  for (LooseVessel& vessel : vessels)
+  {
+    vessel.alone = vessel.confidence;
+  }
   if (!(together(1.0) > most))
   {
     return;
@@ -815,10 +819,17 @@ std::vector<TreeWarning> LooseVesselWarnings(const std::vector<LooseVessel>& ves
 {
   constexpr double rather = 0.5;
   std::vector<TreeWarning> warnings;
+  const LooseVessel* likeliest = nullptr; // of those that are too many
+  int crowd = 0;
   for (const LooseVessel& vessel : vessels)
   {
     if (vessel.confidence < rather)
     {
+      if (vessel.alone >= rather)
+      {
+        ++crowd;
+        likeliest = likeliest && likeliest->alone >= vessel.alone ? likeliest : &vessel;
+      }
       continue;
     }
     const Vector3& from = vessel.points.front();
@@ -831,6 +842,16 @@ std::vector<TreeWarning> LooseVesselWarnings(const std::vector<LooseVessel>& ves
       vessel.length, from[0], from[1], from[2], to[0], to[1], to[2], middle[0], middle[1],
       middle[2], vessel.nearest.c_str());
     warnings.push_back({ text.data(), vessel.nearest, middle, std::min(0.99, vessel.confidence) });
+  }
+  if (likeliest)
+  {
+    const Vector3& middle = likeliest->points[likeliest->points.size() / 2];
+    std::array<char, 300> text;
+    std::snprintf(text.data(), text.size(),
+      "%d %svessels that are in no tree look like arteries one by one, the likeliest %.0f mm by "
+      "(%.1f, %.1f, %.1f); no tree lacks so many: most are noise or veins, some may be arteries",
+      crowd, warnings.empty() ? "" : "more ", likeliest->length, middle[0], middle[1], middle[2]);
+    warnings.push_back({ text.data(), likeliest->nearest, middle, likeliest->confidence });
   }
   return warnings;
 }

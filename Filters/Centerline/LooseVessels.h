@@ -33,6 +33,7 @@ struct LooseVessel
   double away = 0.0;        ///< mm of the mean heart from its courses of arteries, mean
   bool goesOn = false;      ///< it begins ahead of a tip of the tree, and runs in its direction
   double confidence = 0.0;  ///< 0 to 1, that it is an artery
+  double alone = 0.0;       ///< the same, were it the only one
   std::string
     nearest; ///< artery of the mean heart whose course is nearest: "D2", "LAD", "RCA", ...
 };
@@ -62,7 +63,8 @@ std::vector<LooseVessel> FindLooseVessels(const LooseVesselInput& input);
  */
 void ExpectFewMissing(std::vector<LooseVessel>& vessels);
 
-/// A warning for each one that is rather an artery than not (a confidence of a half or more).
+/// A warning for each one that is rather an artery than not (a confidence of a half or more); one more, with their number, for all
+/// that would be if they were not too many.
 std::vector<TreeWarning> LooseVesselWarnings(const std::vector<LooseVessel>& vessels);
 }
 

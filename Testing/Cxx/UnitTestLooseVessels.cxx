@@ -241,6 +241,14 @@ TEST_F(LooseVessels, ATreeLacksAFewNotDozens)
   // What is sure stays, and all else is divided alike.
   EXPECT_GT(vessels[7].confidence, 0.98);
   EXPECT_EQ(vessels[0].confidence, vessels[99].confidence);
+  // One is told by itself, the others together.
+  vessels[20].alone = 0.7;
+  vessels[20].points = { Vector3(0.0, 0.0, 0.0), Vector3(1.0, 2.0, 3.0) };
+  const std::vector<TreeWarning> told = LooseVesselWarnings(vessels);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].what.find("99 more vessels"), 0U) << told[1].what;
+  EXPECT_NE(told[1].what.find("(1.0, 2.0, 3.0)"), std::string::npos) << told[1].what;
+  EXPECT_EQ(told[1].confidence, vessels[20].confidence);
   ASSERT_EQ(LooseVesselWarnings(few).size(), 9U);
   ExpectFewMissing(few);
   EXPECT_EQ(few[0].confidence, 0.6);

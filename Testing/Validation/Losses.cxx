@@ -260,12 +260,13 @@ std::vector<Said> WarningsOf(const PhantomScan& scan, const FoundTree& found)
   }
   const LooseVesselInput input{ image, scan.vesselness.data(), found.tree, found.labels.heart,
     scan.window.tissue, scan.window.blood };
-  for (const LooseVessel& vessel : FindLooseVessels(input))
+  const std::vector<LooseVessel> loose = FindLooseVessels(input);
+  for (const TreeWarning& warning : LooseVesselWarnings(loose))
   {
-    for (const TreeWarning& warning : LooseVesselWarnings({ vessel }))
-    {
-      list.push_back({ "loose", warning.what, warning.vessel, vessel.points });
-    }
+    const auto own = std::find_if(loose.begin(), loose.end(),
+      [&](const LooseVessel& vessel)
+      { return vessel.points[vessel.points.size() / 2] == warning.place; });
+    list.push_back({ "loose", warning.what, warning.vessel, own->points });
   }
   return list;
 }
