@@ -5,6 +5,7 @@
 #include "VesselTestData.h"
 
 #include <gtest/gtest.h>
+#include <vtkVersionMacros.h>
 
 #include <cmath>
 #include <filesystem>
@@ -206,5 +207,10 @@ TEST_F(TestVesselModel, NamesWhatIsBroken)
   Save(vtkNew<vtkXMLPolyDataWriter>(), tree, this->Folder / "centerline.vtp");
   this->ExpectFailure("centerline.vtp", "MaximumInscribedSphereRadius");
   Save(vtkNew<vtkXMLPolyDataWriter>(), vtkNew<vtkPolyData>(), this->Folder / "centerline.vtp");
-  this->ExpectFailure("centerline.vtp", "Cannot read");
+#if VTK_MAJOR_VERSION == 9 && VTK_MINOR_VERSION == 1
+  const char* fault = "Cannot read"; // it takes a file without pieces for a damaged one
+#else
+  const char* fault = "is no tree of centerlines";
+#endif
+  this->ExpectFailure("centerline.vtp", fault);
 }

@@ -15,6 +15,7 @@
 #include <map>
 #include <numeric>
 #include <set>
+#include <string_view>
 
 using namespace coronary;
 
@@ -53,7 +54,7 @@ std::int16_t ValueAt(const CoronaryPhantom& phantom, const Vector3& position, do
 }
 
 const PhantomMotionSummary& Find(
-  const std::vector<PhantomMotionSummary>& summaries, const std::string& name)
+  const std::vector<PhantomMotionSummary>& summaries, std::string_view name)
 {
   const auto found = std::find_if(summaries.begin(), summaries.end(),
     [&](const PhantomMotionSummary& summary) { return summary.name == name; });
