@@ -37,6 +37,17 @@ constexpr double Wavelength = 3.0;
 /// Degrees of the wall behind calcium beyond which nothing is measured.
 constexpr double MaximumArc = 180.0;
 constexpr double MinimumRays = 0.4; ///< share of rays that have to count
+/// Plaque around a lumen, of the contrast between fat and lumen: 0 to 110 HU in most, mean and standard deviation.
+constexpr double WallLevel = 0.35;
+constexpr double WallLevelDeviation = 0.1;
+/// From here on a lumen alone does not explain a section: misfit of the noise, and of the contrast (discs in voxels are no discs).
+constexpr double WallMisfit[] = { 0.85, 0.02 };
+constexpr double WallBetter = 0.75; ///< of its misfit that one with a wall has at most
+constexpr double MinimumWall =
+  0.25; ///< mm that the wall is thick in the mean: less the blur does not show
+constexpr double WallWindow =
+  15.0; ///< mm along the vessel in which its outer wall is as wide as the widest lumen, or less
+constexpr double WallGrowth = 1.4; ///< and more by remodelling
 
 /// Values of a section in polar coordinates around a place.
 struct PolarSection
@@ -71,6 +82,13 @@ struct Fit
   double hiddenArc = 0.0; ///< degrees of the wall behind calcium
 };
 
+/// A disc of plaque with the lumen in it.
+struct WalledFit
+{
+  Fit lumen;
+  Fit wall; ///< its outer border and its level
+};
+
 struct Prior
 {
   double radius = 1.0; ///< mm, where the search begins
@@ -78,6 +96,45 @@ struct Prior
   double levelDeviation = 0.0;
   double shift = 0.3; ///< mm, standard deviation of the centre
   double noise = 10.0;
+};
+
+/// A blurred disc's share at a distance from its centre, mm, with derivatives by the distance and the radius, 1/mm.
+class DiscShares
+{
+public:
+  struct Share
+  {
+    double value;
+    double byDistance;
+    double byRadius;
+  };
+
+  DiscShares(double radius, double blur)
+    : Blur(blur)
+    , Radius(radius / blur)
+    , Disc(this->Radius)
+    , Wider(this->Radius + E)
+    , Thinner(std::max(0.0, this->Radius - E))
+  {
+  }
+  Share At(double distance) const
+  {
+    const double d = distance / this->Blur;
+    const double near = std::max(0.0, d - E);
+    return { this->Disc.At(d),
+      (this->Disc.At(d + E) - this->Disc.At(near)) / (d + E - near) / this->Blur,
+      (this->Wider.At(d) - this->Thinner.At(d)) /
+        (this->Radius + E - std::max(0.0, this->Radius - E)) / this->Blur };
+  }
+
+private:
+  static constexpr double E = 0.02; ///< blurs, half of the differences' step
+
+  double Blur;
+  double Radius; ///< blurs
+  BlurredProfile Disc;
+  BlurredProfile Wider;
+  BlurredProfile Thinner;
 };
 
 class SectionFitter
@@ -114,6 +171,48 @@ public:
     }
     fit.hiddenArc = this->HiddenArc(section, fit);
     return fit;
+  }
+
+  /**
+   * The lumen in a plaque: a blurred disc within another one, whose level lies between.
+   * @param alone  what a lumen alone would be
+   * @param widest  mm, of the outer wall
+   * @return the lumen, found if that explains the section much better than a lumen alone
+   */
+  Fit MeasureWalled(const Vector3& position, const Vector3& tangent, const Prior& prior,
+    const Fit& alone, double widest) const
+  {
+    const PolarSection section =
+      this->Sample(position, tangent, widest + (RingEnd + 0.5) * this->Blur, false);
+    WalledFit fit;
+    if (!this->BeginWall(section, prior, widest, fit))
+    {
+      return {};
+    }
+    std::array<double, Rays> around;
+    std::array<char, Rays> counts;
+    for (int round = 0; round < 5; ++round)
+    {
+      if (!this->MeasureAround(section, fit.wall, around, counts) ||
+        !this->SolveWalled(section, prior, widest, around, counts, fit))
+      {
+        return {};
+      }
+    }
+    const double misfit = this->MisfitOf(section, fit, around, counts, fit);
+    WalledFit one;
+    one.lumen = one.wall = alone;
+    std::array<double, Rays> aroundOne;
+    std::array<char, Rays> countsOne;
+    if (!this->MeasureAround(section, alone, aroundOne, countsOne) ||
+      misfit > WallBetter * this->MisfitOf(section, one, aroundOne, counts, fit))
+    {
+      return {};
+    }
+    const double thick = fit.wall.radius - fit.lumen.radius;
+    fit.lumen.found = thick > MinimumWall;
+    fit.lumen.misfit = misfit;
+    return fit.lumen;
   }
 
 private:
@@ -236,15 +335,20 @@ private:
     return left >= MinimumRays * Rays;
   }
 
+  /// mm^2 of one independent value: noise is the same over about a voxel.
+  double Patch() const
+  {
+    const double correlated = std::max(0.9 * this->Image.MinimumSpacing(), this->Blur);
+    return 4.0 * M_PI * correlated * correlated;
+  }
+
   /// Gauss-Newton for centre, radius and level, with surroundings that are given.
   bool Solve(const PolarSection& section, const Prior& prior,
     const std::array<double, Rays>& around, const std::array<char, Rays>& counts, Fit& fit) const
   {
     using Matrix4 = Eigen::Matrix4d;
     using Vector4 = Eigen::Vector4d;
-    // Noise is the same over about a voxel: so many independent values there are.
-    const double correlated = std::max(0.9 * this->Image.MinimumSpacing(), this->Blur);
-    const double patch = 4.0 * M_PI * correlated * correlated;
+    const double patch = this->Patch();
     const double most = section.count * section.step - RingStart * this->Blur;
     double noise = std::max(prior.noise, 1e-6);
     for (int iteration = 0; iteration < 4; ++iteration)
@@ -253,11 +357,7 @@ private:
       Vector4 right = Vector4::Zero();
       double squares = 0.0;
       double area = 0.0;
-      const double e = 0.02;
-      const double r = fit.radius / this->Blur;
-      const BlurredProfile lumen(r);
-      const BlurredProfile wider(r + e);
-      const BlurredProfile thinner(std::max(0.0, r - e));
+      const DiscShares lumen(fit.radius, this->Blur);
       for (int ray = 0; ray < Rays; ++ray)
       {
         if (counts[ray] == 0)
@@ -285,16 +385,11 @@ private:
             continue;
           }
           const double contrast = fit.level - around[ray];
-          const double d = distance / this->Blur;
-          const double share = lumen.At(d);
-          const double byDistance = (lumen.At(d + e) - lumen.At(std::max(0.0, d - e))) /
-            (d + e - std::max(0.0, d - e)) / this->Blur;
-          const double byRadius =
-            (wider.At(d) - thinner.At(d)) / (r + e - std::max(0.0, r - e)) / this->Blur;
-          const double residual = section.values[at] - (around[ray] + share * contrast);
+          const DiscShares::Share share = lumen.At(distance);
+          const double residual = section.values[at] - (around[ray] + share.value * contrast);
           const double inverse = distance > 1e-9 ? 1.0 / distance : 0.0;
-          const Vector4 row(-contrast * byDistance * dx * inverse,
-            -contrast * byDistance * dy * inverse, contrast * byRadius, share);
+          const Vector4 row(-contrast * share.byDistance * dx * inverse,
+            -contrast * share.byDistance * dy * inverse, contrast * share.byRadius, share.value);
           // What fits badly is something else.
           const double far = residual / (4.0 * noise);
           const double weight =
@@ -338,6 +433,192 @@ private:
       fit.deviation = std::sqrt(std::max(0.0, covariance(2, 2)));
       fit.found = std::isfinite(fit.radius) && std::isfinite(fit.x) && std::isfinite(fit.y);
       if (!fit.found)
+      {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  /// A first wall, where rays fall half way from plaque to what is around, and a first lumen, where it is brightest.
+  bool BeginWall(
+    const PolarSection& section, const Prior& prior, double widest, WalledFit& fit) const
+  {
+    const double contrast = prior.level - this->Background;
+    fit.lumen.level = prior.level;
+    fit.wall.level = this->Background + WallLevel * contrast;
+    const double border = this->Background + 0.5 * WallLevel * contrast;
+    std::vector<double> distances;
+    double most = -1e30;
+    for (int ray = 0; ray < Rays; ++ray)
+    {
+      const auto [c, s] = PolarSection::Direction(ray);
+      int n = 0;
+      for (; n < section.count && section.values[section.At(ray, n)] > border; ++n)
+      {
+        // The mean of three: noise is brighter than a thin lumen.
+        const double value = section.values[section.At(ray, n)] +
+          section.values[section.At((ray + 1) % Rays, n)] +
+          section.values[section.At((ray + Rays - 1) % Rays, n)];
+        if (section.Distance(n) < 0.7 * widest && value > most)
+        {
+          most = value;
+          fit.lumen.x = section.Distance(n) * c;
+          fit.lumen.y = section.Distance(n) * s;
+        }
+      }
+      if (n < section.count && n > 0)
+      {
+        const double distance = section.Distance(n);
+        distances.push_back(distance);
+        fit.wall.x += 2.0 * distance * c;
+        fit.wall.y += 2.0 * distance * s;
+      }
+    }
+    if (static_cast<double>(distances.size()) < MinimumRays * Rays)
+    {
+      return false;
+    }
+    fit.wall.x /= static_cast<double>(distances.size());
+    fit.wall.y /= static_cast<double>(distances.size());
+    fit.wall.radius = std::min(widest, MedianOf(std::move(distances)));
+    fit.lumen.radius = std::min(this->Blur, 0.6 * fit.wall.radius);
+    return std::hypot(fit.wall.x, fit.wall.y) < fit.wall.radius;
+  }
+
+  /// Calls for each sample that counts: at(ray, sample, distance from the section's centre, weight of its area).
+  template <typename At>
+  void ForWalled(const PolarSection& section, const WalledFit& within,
+    const std::array<char, Rays>& counts, const At& at) const
+  {
+    const double reach = within.wall.radius + RingStart * this->Blur;
+    for (int ray = 0; ray < Rays; ++ray)
+    {
+      const auto [c, s] = PolarSection::Direction(ray);
+      for (int n = 0; counts[ray] != 0 && n < section.count; ++n)
+      {
+        const double rho = section.Distance(n);
+        if (DistanceFrom(within.wall, rho * c, rho * s) <= reach)
+        {
+          at(ray, n, rho, rho * section.step * (2.0 * M_PI / Rays));
+        }
+      }
+    }
+  }
+
+  /// Root mean square of what a fit leaves over, on the samples that are within another one.
+  double MisfitOf(const PolarSection& section, const WalledFit& fit,
+    const std::array<double, Rays>& around, const std::array<char, Rays>& counts,
+    const WalledFit& within) const
+  {
+    const BlurredProfile lumen(fit.lumen.radius / this->Blur);
+    const BlurredProfile wall(fit.wall.radius / this->Blur);
+    double squares = 0.0;
+    double area = 0.0;
+    this->ForWalled(section, within, counts,
+      [&](int ray, int n, double rho, double weight)
+      {
+        const auto [c, s] = PolarSection::Direction(ray);
+        const double inner = lumen.At(DistanceFrom(fit.lumen, rho * c, rho * s) / this->Blur);
+        const double outer = wall.At(DistanceFrom(fit.wall, rho * c, rho * s) / this->Blur);
+        const double residual = section.values[section.At(ray, n)] -
+          (around[ray] + outer * (fit.wall.level - around[ray]) +
+            inner * (fit.lumen.level - fit.wall.level));
+        squares += weight * residual * residual;
+        area += weight;
+      });
+    return area > 0.0 ? std::sqrt(squares / area) : 1e30;
+  }
+
+  /// Gauss-Newton for both discs: centre, radius and level of the lumen, then of the wall.
+  bool SolveWalled(const PolarSection& section, const Prior& prior, double widest,
+    const std::array<double, Rays>& around, const std::array<char, Rays>& counts,
+    WalledFit& fit) const
+  {
+    using Matrix8 = Eigen::Matrix<double, 8, 8>;
+    using Vector8 = Eigen::Matrix<double, 8, 1>;
+    const double contrast = std::max(1.0, prior.level - this->Background);
+    const double patch = this->Patch();
+    double noise = std::max(prior.noise, 1e-6);
+    for (int iteration = 0; iteration < 4; ++iteration)
+    {
+      Matrix8 normal = Matrix8::Zero();
+      Vector8 right = Vector8::Zero();
+      double squares = 0.0;
+      double area = 0.0;
+      const DiscShares lumen(fit.lumen.radius, this->Blur);
+      const DiscShares wall(fit.wall.radius, this->Blur);
+      this->ForWalled(section, fit, counts,
+        [&](int ray, int n, double rho, double size)
+        {
+          const auto [c, s] = PolarSection::Direction(ray);
+          Vector8 row;
+          double value = around[ray];
+          const auto add = [&](const Fit& disc, const DiscShares& shares, double under, int first)
+          {
+            const double dx = rho * c - disc.x;
+            const double dy = rho * s - disc.y;
+            const double distance = std::hypot(dx, dy);
+            const DiscShares::Share at = shares.At(distance);
+            const double inverse = distance > 1e-9 ? 1.0 / distance : 0.0;
+            row.segment<4>(first) << -(disc.level - under) * at.byDistance * dx * inverse,
+              -(disc.level - under) * at.byDistance * dy * inverse,
+              (disc.level - under) * at.byRadius, at.value;
+            value += at.value * (disc.level - under);
+          };
+          add(fit.wall, wall, around[ray], 4);
+          add(fit.lumen, lumen, fit.wall.level, 0);
+          row[7] -= row[3];
+          const double residual = section.values[section.At(ray, n)] - value;
+          const double far = residual / (4.0 * noise);
+          const double weight = size / patch / (1.0 + far * far);
+          normal += weight * row * row.transpose();
+          right += weight * residual * row;
+          squares += weight * residual * residual;
+          area += weight;
+        });
+      if (!(area > 0.0))
+      {
+        return false;
+      }
+      noise = std::max(prior.noise, std::sqrt(squares / area));
+      Matrix8 information = normal / (noise * noise);
+      Vector8 gradient = right / (noise * noise);
+      const auto hold = [&](int n, double off, double deviation)
+      {
+        information(n, n) += 1.0 / (deviation * deviation);
+        gradient[n] += off / (deviation * deviation);
+      };
+      // The line runs somewhere in the wall; the lumen is anywhere in it.
+      hold(0, fit.wall.x - fit.lumen.x, 0.5 * fit.wall.radius);
+      hold(1, fit.wall.y - fit.lumen.y, 0.5 * fit.wall.radius);
+      hold(2, 0.0, 10.0);
+      hold(3, prior.level - fit.lumen.level, prior.levelDeviation);
+      hold(4, -fit.wall.x, 0.5 * widest);
+      hold(5, -fit.wall.y, 0.5 * widest);
+      hold(6, 0.0, 10.0);
+      hold(
+        7, this->Background + WallLevel * contrast - fit.wall.level, WallLevelDeviation * contrast);
+      const Matrix8 covariance = information.inverse();
+      const Vector8 change = covariance * gradient;
+      const auto move = [&](Fit& disc, int first, double most)
+      {
+        const double step = 0.5 * std::max(disc.radius, this->Blur);
+        disc.x += std::clamp(change[first], -step, step);
+        disc.y += std::clamp(change[first + 1], -step, step);
+        disc.radius = std::clamp(disc.radius + std::clamp(change[first + 2], -step, step),
+          MinimumRadius, std::max(MinimumRadius, most));
+        disc.level += change[first + 3];
+      };
+      move(fit.wall, 4, widest);
+      move(fit.lumen, 0, fit.wall.radius);
+      // A lumen of which little is seen is known by its area: what it may be grows with the root of that.
+      const double byArea = 2.0 * fit.lumen.radius * std::sqrt(std::max(0.0, covariance(2, 2)));
+      fit.lumen.deviation =
+        std::sqrt(fit.lumen.radius * fit.lumen.radius + byArea) - fit.lumen.radius;
+      fit.lumen.found = std::isfinite(fit.lumen.radius + fit.lumen.x + fit.lumen.y) &&
+        std::isfinite(fit.wall.radius + fit.wall.x + fit.wall.y);
+      if (!fit.lumen.found)
       {
         return false;
       }
@@ -417,7 +698,22 @@ bool InParent(
 /// What a path was measured to be, before anything is smoothed.
 struct PathWork
 {
+  /// mm that an outer wall may be wide at a place: as the lumen was before and behind a plaque, and remodelled.
+  double WidestNear(std::size_t place) const
+  {
+    double widest = 0.0;
+    for (std::size_t i = 0; i < this->expected.size(); ++i)
+    {
+      if (std::abs(this->path->arc[i] - this->path->arc[place]) < WallWindow)
+      {
+        widest = std::max(widest, this->expected[i]);
+      }
+    }
+    return WallGrowth * widest;
+  }
+
   const VesselPath* path = nullptr;
+  std::vector<double> expected; ///< mm
   std::vector<Vector3> tangents;
   std::vector<char> skipped; ///< in a mouth, or bridged
   std::vector<char> besideCalcium;
@@ -433,7 +729,7 @@ struct Refiner
 
   void Prepare(PathWork& work, const std::vector<VesselPath>& paths, RefinedLumen& result) const;
   std::vector<double> ExpectedRadii(const PathWork& work) const;
-  Fit MeasureAt(const PathWork& work, std::size_t place, double expected) const;
+  Fit MeasureAt(const PathWork& work, std::size_t place) const;
   void Finish(const PathWork& work, RefinedLumen& result) const;
   bool IsMeasured(const Fit& fit) const
   {
@@ -492,8 +788,9 @@ std::vector<double> Refiner::ExpectedRadii(const PathWork& work) const
   return radii;
 }
 
-Fit Refiner::MeasureAt(const PathWork& work, std::size_t place, double expected) const
+Fit Refiner::MeasureAt(const PathWork& work, std::size_t place) const
 {
+  const double expected = work.expected[place];
   const std::int64_t p = work.path->points[place];
   const Vector3& tangent = work.tangents[place];
   const double contrast = std::max(1.0, this->levels.level[p] - this->levels.background);
@@ -521,6 +818,15 @@ Fit Refiner::MeasureAt(const PathWork& work, std::size_t place, double expected)
       if (this->IsMeasured(fit) && (!this->IsMeasured(best) || fit.misfit < 0.8 * best.misfit))
       {
         best = fit;
+      }
+    }
+    if (best.found && best.misfit > std::max(WallMisfit[0] * prior.noise, WallMisfit[1] * contrast))
+    {
+      const Fit walled =
+        this->fitter.MeasureWalled(position, tangent, prior, best, work.WidestNear(place));
+      if (walled.found && this->IsMeasured(walled))
+      {
+        return walled;
       }
     }
     return best;
@@ -763,13 +1069,12 @@ RefinedLumen RefineLumen(const VesselTree& tree, const std::vector<VesselPath>& 
     std::size_t point;
   };
   std::vector<PathWork> works(paths.size());
-  std::vector<std::vector<double>> expected;
   std::vector<Place> places;
   for (std::size_t n = 0; n < paths.size(); ++n)
   {
     works[n].path = &paths[n];
     refiner.Prepare(works[n], paths, result);
-    expected.push_back(refiner.ExpectedRadii(works[n]));
+    works[n].expected = refiner.ExpectedRadii(works[n]);
     for (std::size_t i = 0; i < paths[n].points.size(); ++i)
     {
       if (works[n].skipped[i] == 0)
@@ -785,8 +1090,7 @@ RefinedLumen RefineLumen(const VesselTree& tree, const std::vector<VesselPath>& 
       for (std::int64_t n = first; n < last; ++n)
       {
         const Place& place = places[n];
-        works[place.path].fits[place.point] =
-          refiner.MeasureAt(works[place.path], place.point, expected[place.path][place.point]);
+        works[place.path].fits[place.point] = refiner.MeasureAt(works[place.path], place.point);
       }
     },
     progress);

@@ -205,7 +205,7 @@ def main():
     with open("clicks.mrk.json", "w", encoding="utf-8") as file:
         json.dump({"markups": [{"type": "Fiducial", "coordinateSystem": "LPS",
                                 "controlPoints": [{"position": click} for click in clicks]}]}, file)
-    edit("add-branch", "--points-file", "clicks.mrk.json", code=1, says=("already",))
+    edit("add-branch", "--points-file", os.path.abspath("clicks.mrk.json"), code=1, says=("already",))
     # All that comes behind.
     edit("apply", "--until", "surface")
     check(report()["surface"]["triangles"] > 3000 and report()["stages"][-1]["name"] == "surface", "no surface")

@@ -15,6 +15,7 @@
 #include <cmath>
 #include <functional>
 #include <random>
+#include <string>
 #include <vector>
 
 using namespace coronary;
@@ -25,6 +26,7 @@ constexpr double Blur = 0.4;        // mm
 constexpr double Lumen = 400.0;     // HU
 constexpr double Fat = -80.0;       // HU
 constexpr double Calcium = 1100.0;  // HU
+constexpr double Plaque = 80.0;     // HU
 constexpr double TubeLength = 60.0; // mm
 constexpr double Spacing = 0.4;     // mm
 
@@ -40,6 +42,9 @@ struct Tube
   std::function<double(double)> radius;
   std::vector<Ball> balls;
   double brightness = Lumen;
+  /// mm, of the outer wall; plaque fills what the lumen leaves of it. None: there is no plaque.
+  std::function<double(double)> wall;
+  double eccentricity = 0.0; ///< 1: the lumen lies at the wall
 
   std::vector<float> values;
   ScalarImage image;
@@ -67,8 +72,16 @@ struct Tube
             const double distance = (p - ball.centre).norm() - ball.radius;
             value += 0.5 * std::erfc(distance / (std::sqrt(2.0) * Blur)) * (Calcium - value);
           }
-          const double share = BlurredDisc(
-            std::hypot(p[0], p[1]) / Blur, this->radius(std::clamp(p[2], 0.0, TubeLength)) / Blur);
+          const double z = std::clamp(p[2], 0.0, TubeLength);
+          double off = 0.0;
+          if (this->wall)
+          {
+            value +=
+              BlurredDisc(std::hypot(p[0], p[1]) / Blur, this->wall(z) / Blur) * (Plaque - value);
+            off = this->eccentricity * (this->wall(z) - this->radius(z));
+          }
+          const double share =
+            BlurredDisc(std::hypot(p[0] - off, p[1]) / Blur, this->radius(z) / Blur);
           this->values[at] = static_cast<float>(value + share * (this->brightness - value));
         }
       }
@@ -274,6 +287,31 @@ TEST(StenosisGrading, DegreesAreThoseOfTheTube)
     const double minimum =
       *std::min_element(measured.lumen.radius.begin() + 40, measured.lumen.radius.end() - 40);
     EXPECT_NEAR(minimum, 1.6 * (1.0 - degree), 0.1);
+  }
+}
+
+TEST(StenosisGrading, PlaqueInFatIsNoLumen)
+{
+  constexpr double healthy = 1.6; // mm
+  for (const double eccentricity : { 0.0, 0.6 })
+  {
+    for (const double degree : { 0.5, 0.7, 0.9 })
+    {
+      const std::string what =
+        std::to_string(degree) + " of the diameter, eccentric by " + std::to_string(eccentricity);
+      Tube tube;
+      tube.eccentricity = eccentricity;
+      const auto inPlaque = [](double z) { return std::exp(-0.5 * std::pow((z - 30.0) / 3.4, 2)); };
+      tube.radius = [=](double z) { return healthy * (1.0 - degree * inPlaque(z)); };
+      tube.wall = [=](double z) { return healthy * (1.0 + 0.1 * inPlaque(z)); };
+      tube.Render();
+      const Measured measured = MeasureAll(tube, LineWith(healthy));
+      ASSERT_EQ(measured.grading.lesions.size(), 1U) << what;
+      const Stenosis& lesion = measured.grading.lesions[0];
+      EXPECT_NEAR(lesion.degree, degree, 0.1) << what;
+      EXPECT_LE(lesion.degreeLow, degree) << what;
+      EXPECT_GE(lesion.degreeHigh, degree) << what;
+    }
   }
 }
 
