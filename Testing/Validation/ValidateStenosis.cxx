@@ -368,6 +368,10 @@ std::vector<Case> MakeCases()
   add("4 of 95 %", 4, 0.95, 0);
   add("12 calcifications", 0, 0.0, 12);
   add("4 of 60 %, 12 calcifications", 4, 0.6, 12);
+  // Soft plaque of 90 HU is left around the lumen; above it is gone.
+  add("plaques of 50, 70 and 90 %", 0, 0.0, 0);
+  cases.back().healthy = false;
+  AddDisease("stenosed", cases.back().settings);
   return cases;
 }
 }
