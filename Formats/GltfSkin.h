@@ -3,7 +3,7 @@
  * @brief A beating surface on its bones as glTF 2.0: one mesh, a skin and an animation.
  *
  * Source: Khronos Group, "glTF 2.0 Specification" (ISO/IEC 12113:2022), chapters 3.7 (meshes, skins) and
- * 3.11 (animations). docs/exchange.md has the equations.
+ * 3.11 (animations). docs/exchange.md says how bones become nodes.
  *
  * glTF moves a point by the mean of matrices, weighted: linear blending. A bone that stretches is no one matrix,
  * since beyond its ends it is rigid. It is the mean of two, one that is rigid about its first joint and one about

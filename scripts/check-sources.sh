@@ -42,7 +42,7 @@ for file in "${files[@]}"; do
           ;;
       esac
       ;;
-    ServerManagerXML/*.xml) xmls+=("$file") ;;
+    ServerManagerXML/*.xml | Plugin/*.xml) xmls+=("$file") ;;
     *.sh | *.bash | .ci/run) scripts+=("$file") ;;
   esac
 done

@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
 # Installs the Debian packages that DynamicCoronary is configured, built and tested with.
-# Each package and why it is needed: docs/development.md.
 set -euo pipefail
 
 usage() {
@@ -55,6 +54,11 @@ case "$suite" in
     ;;
 esac
 
+# Build, repeated builds, faster linking. Linear algebra: Eigen; AMD's order for the skin weights' equations: SuiteSparse.
+# DICOM pixels: GDCM; compressed images: zlib; XML: Expat; JSON; command lines: CLI11; X-ray attenuation: xraylib.
+# Optional: the mesher's workers TetGen and CGAL (which also tests the Hausdorff distance), animated pictures: giflib, game
+# controllers: libevdev, 3D Slicer: OpenIGTLink. FreeType, GLEW and X11 are what VTK's CMake files ask for.
+# dpkg-dev and file: cpack finds what the package depends on.
 common=(
   g++ cmake ninja-build ccache mold
   libeigen3-dev libsuitesparse-dev libgdcm-dev zlib1g-dev libexpat1-dev nlohmann-json3-dev libcli11-dev "$tetgen"
@@ -64,10 +68,13 @@ common=(
   dpkg-dev file python3
   pkg-config libevdev-dev libopenigtlink-dev
 )
+# ParaView's headers need MPI; Qt: help pages, icons (blank without the SVG plugin), and the simulator's window.
 paraview=(paraview-dev python3-paraview libopenmpi-dev libdouble-conversion-dev "${qt[@]}")
-# For tests; without those after the first some are skipped.
+# For tests; without those after the first two some are skipped: clicks in the window; the review page; a validator of glTF
+# that is fetched; X-ray projections; the notebook.
 tests=(libgtest-dev libxtst6 "${browser[@]}" curl ca-certificates plastimatch python3-nbconvert python3-ipykernel python3-matplotlib)
 nightly=(libbenchmark-dev libinsighttoolkit5-dev elastix)
+# scripts/fuzz.sh, scripts/lint.sh, scripts/check-leaks.sh.
 developer=("${clang[@]}" valgrind heaptrack shellcheck)
 
 check_only=no

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Writes docs/reference/: a page for every filter, reader and writer, out of its header and its ParaView proxy.
+"""Writes docs/reference/: a page for every filter, reader and writer, out of its header and its ParaView proxy, and those
+of code_tables.py: keys of JSON files and other tables of the sources.
 
 Usage: make-filter-reference.py [--check]
   --check  write nothing; exit code 1 when a page is not what headers and XML say, or when these leave
@@ -14,6 +15,8 @@ import re
 import sys
 import xml.etree.ElementTree as ElementTree
 from collections import namedtuple
+
+import code_tables
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 OUTPUT = "docs/reference"
@@ -323,6 +326,7 @@ class Pages:
             self.files["%s.md" % name] = self.page(self.headers[name])
         self.files["README.md"] = self.index()
         self.files["arrays.md"] = self.array_index()
+        self.files.update(code_tables.pages(self.complaints))
 
     def complain(self, header, text):
         self.complaints.append("%s/%s.h: %s" % (header.folder, header.name, text))
@@ -546,7 +550,9 @@ class Pages:
                  "One page a class, made from its header and its ParaView proxy by `scripts/make-filter-reference.py`:",
                  "ports, arrays, properties with their names in ParaView, Python and C++, time, errors. R-R as a unit is the",
                  "fraction of the R-R interval; a number without a unit is a count, a share or a ratio. What each array is,",
-                 "and who makes and takes it: [arrays](arrays.md). Coordinates: [coordinates and units]"
+                 "and who makes and takes it: [arrays](arrays.md). Keys of JSON files: [keys](keys.md); device protocol: "
+                 "[messages](device-messages.md), [frames](device-frames.md); [recordings](recordings.md); [parameters of the population's motion](population.md); "
+                 "[keys of the simulator](hands.md). Coordinates: [coordinates and units]"
                  "(../coordinates-and-units.md). The examples are for `pvpython` and the Python shell of ParaView, with "
                  "[the plugin](../paraview.md#the-plugin).", ""]
         folders = [folder for folder, _ in STAGES]

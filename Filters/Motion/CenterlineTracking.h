@@ -3,7 +3,7 @@
  * @brief Where the vessels of one phase are in all the other phases of a gated series.
  *
  * The tree is found once, at the reference phase; here it is carried through the cycle, and keeps all
- * its branches. docs/motion.md has the equations and the measurements.
+ * its branches. docs/tracking.md has the steps, TrajectoryModel.cxx the equations.
  */
 #ifndef DynamicCoronary_CenterlineTracking_h
 #define DynamicCoronary_CenterlineTracking_h

@@ -18,6 +18,16 @@
 #include <string>
 #include <utility>
 
+// What is minimised (docs/motion.md): J = sum c_ik^2 |P_ik - D_ik|^2 + omega_1 E_temp + omega_2 E_spatial + (1/lambda)
+// E_velocity.
+// Displacement: E_temp is the sum of (h_(k-1) + h_k)/2 times the squared acceleration, by divided differences, time in
+// units of the mean distance of phases; E_spatial the sum over points with two or more neighbours of the squared
+// Laplacian of the displacement from rest, neighbours weighted by 1 / distance. Position (Eq. 14): the sums of the
+// squared P_k - P_(k-1), and of the squared Laplacian of P. A harmonic of a point that 16 phases sample loses 1 - 1/(1
+// + 0.15 omega_1) of its amplitude with these, 1 - 1/(1 + 0.023 omega_1) with the acceleration.
+// E_velocity: the sum over segments of h_k (mean length / length) times the squared difference of (P_(k+1) - P_k)/h_k
+// at its ends; its minimum solves (1 - (1/lambda) Laplacian along the vessel) v = v_measured.
+
 namespace coronary
 {
 namespace

@@ -8,6 +8,11 @@
 #include <string>
 #include <utility>
 
+// The cubic spline through all phases with continuous value, slope and second derivative, over the seam as well: with
+// h_k the distance from phase k to the next one and M_k the second derivative there, indices modulo the number of
+// phases,
+//     h_(k-1) M_(k-1) + 2 (h_(k-1) + h_k) M_k + h_k M_(k+1) = 6 [ (P_(k+1) - P_k)/h_k - (P_k - P_(k-1))/h_(k-1) ]
+
 namespace coronary
 {
 KnotInterval IntervalAt(const std::vector<double>& knots, double time)

@@ -2,7 +2,7 @@
  * @file PeriodicSpline.h
  * @brief The cubic spline over one cycle: through all samples; value, slope and second derivative are continuous.
  *
- * docs/motion.md has the equations.
+ * PeriodicSpline.cxx has the equations.
  */
 #ifndef DynamicCoronary_PeriodicSpline_h
 #define DynamicCoronary_PeriodicSpline_h

@@ -13,6 +13,20 @@
 #include <numeric>
 #include <string>
 
+// Linear, Eq. 8: P(t) = (1 - s) P_1 + s P_2 between the two phases around, s from 0 to 1.
+// Low noise: P_i(t) = c_i + sum over r of U_ir g_r(t): few spatial modes U, each with a Fourier series g of few
+// harmonics, and a ridge on harmonic m of (m^4 - 1) times a factor. The numbers of modes and harmonics and the factor
+// are those that best predict each phase when it is left out (of equally good ones, the smallest). With equal
+// confidences the modes are those of the singular value decomposition; else weighted alternating least squares begin
+// there. Samples below a confidence of 0.05 do not count.
+// Rotations: q_k = q exp(v_k / 2) with q their mean (Markley et al. 2007); the vectors v_k are interpolated like
+// positions.
+// Cross-sections, Eq. 10 and 11: pi a b = A0 (1 + eps_r). The wanted factor c of the radius comes from CalibreFactor,
+// else from the ellipses' area, else from a radius that changes with time; its logarithm is interpolated; eps_r = c^2 -
+// 1, limited.
+// Repeated phases at times t_k are moved to their mean t along the velocity v between the neighbouring phases: P' = P -
+// (t_k - t) v.
+
 namespace coronary
 {
 namespace

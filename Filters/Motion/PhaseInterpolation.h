@@ -2,7 +2,7 @@
  * @file PhaseInterpolation.h
  * @brief Any moment of the cycle out of a few: linear, periodic spline, or few modes and harmonics.
  *
- * docs/motion.md has the equations (Eq. 8, 10 and 11 of the paper among them).
+ * PhaseInterpolation.cxx has the equations (Eq. 8, 10 and 11 of the paper).
  */
 #ifndef DynamicCoronary_PhaseInterpolation_h
 #define DynamicCoronary_PhaseInterpolation_h

@@ -6,7 +6,7 @@
  * surroundings of every place along the vessels are looked for, first coarsely and far, then finely, then
  * the vessel itself, compared with the reference smeared along its motion; and one robust fit over all
  * places and phases, periodic in time, decides. What is not visible is filled from its neighbours in space
- * and time. The tree keeps all its branches at all phases. docs/motion.md has the equations.
+ * and time. The tree keeps all its branches at all phases. docs/tracking.md has the steps.
  *
  * The first request reads every tracked phase, one volume in memory at a time; then any time is answered
  * without reading an image again.

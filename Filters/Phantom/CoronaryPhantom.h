@@ -6,7 +6,7 @@
  * on an epicardial ellipsoid. Motion: one closed-form displacement field of position and time.
  * Images: tissue values, partial volume, point spread function, temporal window and noise of a
  * cardiac CT. Nothing here uses the reconstruction code that the phantom is there to judge.
- * docs/phantom.md has the formulas, their sources, and what the phantom does not model.
+ * docs/phantom.md has the sources, and what the phantom does not model.
  *
  * Time t is the fraction of the R-R interval, any real number; the motion is periodic, t modulo 1.
  * Positions are LPS in mm, with the left coronary ostium of the reference heart at the origin.

@@ -34,27 +34,27 @@ enum class PhantomLesionKind
 struct PhantomLesion
 {
   PhantomLesionKind kind = PhantomLesionKind::Plaque;
-  std::string vessel;          ///< "LAD" (with the left main), "LCx", "RCA", "D1", ..., a graft
-  double position = 0.0;       ///< of the middle, mm from the vessel's origin
-  bool relative = false;       ///< `position` is a share of the vessel's length
-  double length = 10.0;        ///< mm, 0.5 to 150
-  double degree = 0.0;         ///< share of the diameter that is gone, 0 to 0.99; Ectasia: 0 to 2
-  double angle = 0.0;          ///< degrees about the axis: 0 away from the heart, 180 to the muscle
-  double twist = 0.0;          ///< how it turns along the vessel, degrees a mm, -30 to 30
+  std::string vessel;    ///< "LAD" (with the left main), "LCx", "RCA", "D1", ..., a graft
+  double position = 0.0; ///< of the middle, mm from the vessel's origin
+  bool relative = false; ///< `position` is a share of the vessel's length
+  double length = 10.0;  ///< between the places where it is at half of its height, mm, 0.5 to 150
+  double degree = 0.0;   ///< share of the diameter that is gone, 0 to 0.99; Ectasia: 0 to 2
+  double angle = 0.0;    ///< degrees about the axis: 0 away from the heart, 180 to the muscle
+  double twist = 0.0;    ///< how it turns along the vessel, degrees a mm, -30 to 30
   double eccentricity = 0.0;   ///< 0 even all around, 1 all of it on one side
-  double remodelling = 1.0;    ///< 0.7 to 2
+  double remodelling = 1.0;    ///< outer wall's diameter over the healthy lumen's, 0.7 to 2
   double lipid = 0.0;          ///< share of the thickness that the core takes, 0 to 1
   double rim = 0.0;            ///< around the core, mm, 0 to 1: napkin ring
-  double calciumArc = 0.0;     ///< degrees, 0 to 360; 0: one rod, when there is a thickness
-  double calciumThickness = 0; ///< mm, 0 to 3; 0: no calcium
-  double calciumLength = 0.0;  ///< mm, 0: as long as the lesion
-  double fibrousValue = 90.0;  ///< HU, -100 to 300: usual 30 to 130
-  double lipidValue = 20.0;    ///< HU, -100 to 300: usual -30 to 60
-  double rimValue = 130.0;     ///< HU, -100 to 300
-  double calciumValue = 850.0; ///< HU at 120 kV, 130 to 3000
+  double calciumArc = 0.0;     ///< of the calcium along the outer wall, degrees; 0: one rod
+  double calciumThickness = 0; ///< of the calcium, mm; 0: there is none
+  double calciumLength = 0.0;  ///< of the calcium, mm; 0: as long as the lesion
+  double fibrousValue = 90.0;  ///< of the plaque, HU: usual 30 to 130
+  double lipidValue = 20.0;    ///< of the lipid core, HU: usual -30 to 60
+  double rimValue = 130.0;     ///< of the rim, HU, -100 to 300
+  double calciumValue = 850.0; ///< of the calcium, HU at 120 kV, 130 to 3000
   double fill = 0.6;           ///< Occlusion: contrast just behind it, share of that at the ostium
   double strut = 0.09;         ///< Stent: diameter of its wires, mm, 0.04 to 0.3
-  double metalValue = 25000.0; ///< Stent: HU at 120 kV, 1000 to 60000
+  double metalValue = 25000.0; ///< Stent: of its metal, HU at 120 kV, 1000 to 60000
 };
 
 /// A number of a lesion under the name that files have for it.

@@ -7,6 +7,14 @@
 #include <cmath>
 #include <cstring>
 
+// With S = s(t - lag(X)) (1 + amplitude(X)), w from 0 (RCA side) to 1 (LCx side), z01 = (91.5 - c) / 91.5 limited to
+// 0..1 by a smooth clamp:
+// axial: A(w) S z01 towards the apex, A from 18 mm (right) to 12 mm (left); 55 % less over 25 mm above the AV plane;
+// radial: distance from the axis times 1 - 0.10 S sin(pi (0.15 + 0.85 z01)); twist: (9 - 13 z01) degrees times S about
+// the axis;
+// all fades to zero between 1.3 and 2.5 times the epicardial ellipsoid; lag up to 2 % R-R (right and inferior later),
+// amplitude 6 % with 40 mm correlation.
+
 namespace coronary
 {
 namespace

@@ -44,7 +44,7 @@ struct HeartFrame
   Matrix3 axes;   ///< rows a, b, c
 };
 
-/// Position and velocity of material points. See docs/phantom.md, "Motion".
+/// Position and velocity of material points. PhantomMotion.cxx has the formulas.
 class PhantomMotion
 {
 public:

@@ -5,6 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+// Sections have a plateau w with quintic shoulders of min(length / 2, 4 mm): a lumen of radius r = r0 (1 - degree w) in
+// an outer wall of R = r0 (1 + (remodelling - 1) w), off it by eccentricity (R - r); the core lies where the wall is
+// thickest.
+
 namespace coronary
 {
 namespace

@@ -28,46 +28,46 @@ enum class ReconstructionKernel
 struct ScannerSettings
 {
   // Geometry.
-  double sourceToAxis = 541.0;
-  double sourceToDetector = 949.075;
-  int channels = 888; ///< detector columns
-  int rows = 64;
-  double channelPitch = 1.0239;
-  double channelOffset = 0.25; ///< of the arc's middle from the central ray, columns
-  double rowPitch = 1.0988;    ///< at the detector
-  double fill = 0.85;          ///< active share of a cell's width and height
-  double focalSpot = 0.9;
-  int viewsPerTurn = 984;
-  int sources = 1; ///< two stand at a right angle
-  double turnTime = 0.35;
+  double sourceToAxis = 541.0;       ///< of the tube from the axis of rotation
+  double sourceToDetector = 949.075; ///< of the tube from the detector
+  int channels = 888;                ///< detector columns
+  int rows = 64;                     ///< detector rows
+  double channelPitch = 1.0239;      ///< of the columns, at the detector
+  double channelOffset = 0.25;       ///< of the arc's middle from the central ray, columns
+  double rowPitch = 1.0988;          ///< at the detector
+  double fill = 0.85;                ///< active share of a cell's width and height
+  double focalSpot = 0.9;            ///< its width
+  int viewsPerTurn = 984;            ///< of each tube
+  int sources = 1;                   ///< two stand at a right angle
+  double turnTime = 0.35;            ///< of the gantry
 
   // Tube.
-  double kilovolts = 120.0;
+  double kilovolts = 120.0;        ///< of each tube
   double milliamperes = 600.0;     ///< of each tube
   double aluminium = 3.0;          ///< flat filter
   double systolicCurrent = 1.0;    ///< share of the current before 55 and after 96 % R-R
   double electronicNoise = 3500.0; ///< standard deviation, electrons
-  double electronsPerKeV = 17.0;
-  int noise = 1; ///< 0: neither Poisson nor electronic noise, whatever imageNoise says
+  double electronsPerKeV = 17.0;   ///< that a cell gives
+  int noise = 1; ///< 0: neither Poisson nor electronic noise, whatever image_noise_hu says
 
   // Time.
   double pitch = 0.0;          ///< table feed of a turn over the rows' height; 0: step and shoot
   int segments = 1;            ///< beats that share the angles of a half scan
   int extrasystole = 0;        ///< beat of the scan that is cut short, counted from 1; 0: none
-  double overlap = 0.125;      ///< share of a slab that the next one sees again; of a beat's feed
+  double overlap = 0.125;      ///< share of a slab (helical: of a beat's feed) that is seen again
   double beatDeviation = 0.03; ///< relative standard deviation of the R-R intervals
   double heartShift = 0.87;    ///< standard deviation of a beat's shift along each axis
-  double breathing = 0.0;      ///< towards the feet over the whole scan
-  double contrastLoss = 0.0;   ///< share of the iodine from beat to beat
+  double breathing = 0.0;      ///< drift of the heart towards the feet over the whole scan
+  double contrastLoss = 0.0;   ///< share of the iodine lost from beat to beat
 
   // Reconstruction.
   ReconstructionKernel kernel = ReconstructionKernel::Standard;
-  double imageNoise = 0.0; ///< HU in the middle of the patient: sets the current; 0: `milliamperes`
+  double imageNoise = 0.0; ///< HU in the middle of the patient: sets the current; 0: does not
   double iterative = 0.0;  ///< share of the noise that smoothing within edges takes away
 
   // Computing.
   double anatomySpacing = 0.5; ///< voxels of the material maps
-  double anatomyStep = 0.008;  ///< between two maps
+  double anatomyStep = 0.008;  ///< time between two material maps
   std::uint64_t seed = 1;      ///< of noise, beats and shifts
 
   /// @throws std::invalid_argument that names the first setting at fault

@@ -45,7 +45,7 @@ struct CoronaryFlowSettings
   /// Mean flow in diastole / mean flow in systole, at the same place, 0.3 to 5: 1.79 +- 0.48 in the left main,
   /// 2.1 +- 0.8 in the LAD, 1.00 +- 0.32 in the right coronary artery.
   double leftDiastolicRatio = 1.95;
-  double rightDiastolicRatio = 1.0;
+  double rightDiastolicRatio = 1.0; ///< the same in a right tree
 
   /// Mean flow of an outlet is as its diameter to this power, 1 to 4: 3 is Murray's law; 2.27 fits what Doriot et al.
   /// (Coron Artery Dis 2000;11:495) measured at coronary bifurcations (van der Giessen et al., J Biomech 2011;44:1089).

@@ -20,17 +20,17 @@ class WallMotion;
 
 struct InterventionSettings
 {
-  double tickRate = 2000.0;     ///< Hz, 500 to 20000
+  double tickRate = 2000.0;     ///< steps a second, 500 to 20000
   int ticksPerFrame = 33;       ///< between key frames of the wall: 60.6 Hz at 2 kHz
   double heartRate = 75.0;      ///< beats a minute, 0 (pause) to 240
   double startPhase = 0.0;      ///< fraction of the R-R interval
   double segmentLength = 1.5;   ///< mm of the simulated wire, 0.5 to 4
   int capacity = 140;           ///< simulated segments at most, 20 to 1000
   double insideCatheter = 12.0; ///< mm of the wire that are simulated inside the catheter
-  int rootBranch = -1;       ///< branch of WallTopology whose ostium is engaged; -1: the first root
-  double engagement = 3.0;   ///< mm from the ostium to the catheter's tip along the vessel
-  double wallFriction = 1.0; ///< factor on the wire's friction against the wall, 0 to 10
-  double wallStiffness = 60.0; ///< N/mm of a sample's contact
+  int rootBranch = -1;          ///< branch whose ostium is engaged; -1: as the artery says
+  double engagement = 3.0;      ///< mm from the ostium to the catheter's tip along the vessel
+  double wallFriction = 1.0;    ///< factor on the wire's friction against the wall, 0 to 10
+  double wallStiffness = 60.0;  ///< N/mm of a sample's contact
   /// Pa s: per length, across and along the wire, against blood that moves with the walls. Blood's own is about
   /// 0.025; a hundred times that calms the jumps of the light tip, and is still nothing against friction.
   double drag = 2.5;

@@ -1,9 +1,47 @@
 /**
  * @file Recording.h
- * @brief What happened in a session, tick by tick, in a .pcirec file. docs/simulator-files.md has the bytes.
+ * @brief What happened in a session, tick by tick, in a .pcirec file.
  *
  * Tick t is the t-th step of an Intervention, counted from 0: an input of tick t is what step t gets, an event of
  * tick t comes before step t, a hash of tick t is that of the state after t steps.
+ */
+
+/**
+ * @page recordings Bytes of recordings (.pcirec)
+ *
+ * Numbers are little-endian. Ticks are steps counted from 0: an input of tick t goes into step t,
+ * an event of tick t comes before it, everything else of tick t is of the state after t steps.
+ *
+ * - 8 bytes: `PCIREC`, 0, 2 (the version)
+ * - 4 bytes: length of the header, at most 16 MiB
+ * - the header, JSON: `schema` 1, `build`, `scenario` (complete, with the instruments' values),
+ *   `scenario_hash`, `mesh_hash` (FNV-1a of the wall at three phases), `seed`, `tick_hz`, `axes`,
+ *   `start_utc`; hashes and seed as 16 hexadecimal digits
+ * - blocks: length of the packed bytes (4), of the unpacked ones (4, at most 1 MiB), then items,
+ *   packed by zlib (RFC 1950), whose check sum tells damage
+ *
+ * A block ends with each state hash, or after 64 KiB. An item is its type (1), the length of its
+ * payload (4), the ticks since the item before in the file (8), and the payload:
+ *
+ * - 1 input: mask of the numbers that changed (2 bytes), then for each of them, in the order of
+ *   the header's `axes`, 8 bytes: wire position and angle, catheter position and angle, syringe
+ *   (mL), C-arm primary and secondary angle (rad), source to detector (mm), table x, y, z (mm),
+ *   all doubles; pedals (bits: 1 fluoroscopy, 2 cine, 4 mask), a whole number. Written are the
+ *   number's 64 bits less those before, modulo 2^64. A tick without change has none; before the
+ *   first all are 0, source to detector 1100
+ * - 2 force: four single-precision numbers: proximal force (N), proximal torque (N mm), tip force
+ *   (N), greatest contact force (N); every 40 ticks
+ * - 3 event: kind (1 byte), double. Kind 1: heart rate, beats a minute; 2: frames a second of
+ *   fluoroscopy; 3: field of view, mm
+ * - 4 state hash: 8 bytes, FNV-1a of the instruments' state, and of contrast medium and exposures
+ *   once there have been any; every 1000 ticks and at the end
+ * - 5 image hash: 8 bytes, FNV-1a of an X-ray image's size and pixels; written with `--xray`
+ * - 6 annotation: UTF-8 text: messages of the simulation
+ * - 7 end: seven counts of 8 bytes: ticks, then items of the types 1 to 6
+ *
+ * Unknown types are skipped and counted, bytes at the end of a known payload ignored. No length in
+ * a file makes the reader take more memory than the file has bytes, and a block. Version 1 is not
+ * read any more.
  */
 #ifndef DynamicCoronary_Recording_h
 #define DynamicCoronary_Recording_h

@@ -25,7 +25,7 @@ struct ImagingSettings
 {
   std::string background; ///< CT file or folder; empty: the thorax phantom about the heart
   Vector3 backgroundOffset{ Vector3::Zero() }; ///< mm that the CT is moved to fit the vessels
-  std::uint64_t thoraxSeed = 1;
+  std::uint64_t thoraxSeed = 1;                ///< of the thorax phantom
   CArmPose pose; ///< with the isocentre in the middle of the vessels, unless it is given
   bool hasIsocentre = false;  ///< pose.isocentre is given, LPS, mm
   double fieldOfView = 200.0; ///< mm of the detector, across, 80 to 400

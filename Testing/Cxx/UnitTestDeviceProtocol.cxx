@@ -254,7 +254,7 @@ TEST(DeviceProtocol, MessagesThereAndBack)
 
 TEST(DeviceProtocol, ExamplesOfTheDocumentation)
 {
-  std::ifstream stream(DYNAMICCORONARY_SOURCE_DIR "/docs/device-protocol.md");
+  std::ifstream stream(DYNAMICCORONARY_SOURCE_DIR "/docs/reference/device-frames.md");
   const std::string page{ std::istreambuf_iterator<char>(stream), {} };
   ASSERT_FALSE(page.empty());
   HelloMessage hello;

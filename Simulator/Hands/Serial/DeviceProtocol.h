@@ -7,6 +7,61 @@
  *   u8 type | u8 flags | u16 sequence | u32 microseconds | payload | u32 CRC-32 of all before,
  * COBS-encoded, with a 0 behind it.
  */
+
+/**
+ * @page device-messages Messages of the device protocol
+ *
+ * Payloads are packed, without padding. Numbers are little-endian; `f32` and `f64` are IEEE 754.
+ * Texts are ASCII, filled up with 0. Reserved fields are sent as 0 and ignored. Type, name, sender
+ * and length:
+ *
+ * - 1, HELLO (host, 28 bytes): 4 bytes `PCID`; u8 lowest and u8 highest major version that the
+ *   host knows; u16 reserved; u32 nonce, new for each connection; 16 bytes name of the host
+ * - 2, HELLO_ACK (device, 44 bytes): 4 bytes `PCID`; u8 major version: 1; u8 minor version: 0; u16
+ *   reserved; u32 nonce of the HELLO; 16 bytes serial number; 16 bytes firmware
+ * - 3, CAPS (device, 32 bytes): one axis, see below
+ * - 4, START (host, 8 bytes): u16 wanted STATEs a second; u16 watchdog, ms; u32 nonce of the HELLO
+ * - 5, STOP (host, 0 bytes)
+ * - 6, STATE (device, 12 + 4 n bytes): u32 tick of the last FORCE or HEARTBEAT taken; u16 pedals:
+ *   1 fluoroscopy, 2 cine, 4 mask; u16 buttons, as the device numbers them; u16 status: 1 motors
+ *   have relaxed, 2 a force was clamped, 4 fault; u8 number of axes n; u8 reserved; i32[n] counts
+ * - 7, FORCE (host, 24 bytes): u32 tick; u16 validity, 1 to 1000 ms; u16 reserved; f32 N on the
+ *   wire; f32 N on the catheter; f32 N m on the wire; f32 N m on the catheter
+ * - 8, HEARTBEAT (host, 4 bytes): u32 tick
+ * - 9, PING (host, 12 bytes): u32 number; u64 time of the host, microseconds
+ * - 10, PONG (device, 20 bytes): u32 number and u64 time of the PING; u64 time of the device
+ * - 11, ERROR (device, 2 + text bytes): u16: 1 version, 2 nonce, 3 hardware, 4 other; text for
+ *   people, 200 bytes at most
+ * - 12, ZERO (host, 4 bytes): u32, bit i: axis of index i
+ * - 13, ZERO_ACK (device, 4 bytes): the same
+ * - 14, CALIB (both, 12 bytes): u8 index of the axis; 3 bytes reserved; f64 units per count from
+ *   now on
+ *
+ * **CAPS**, one for each axis, in any order: u8 index of the axis from 0, its place in STATE; u8
+ * number of axes, 1 to 16, the same in all; u8 kind, each at most once, except 0; u8 unit: 1 mm, 2
+ * radian, 3 mL, 4 atm; u16 STATEs a second, 100 to 1000; u16 reserved; f64 units per count, not 0,
+ * negative reverses the direction; f32 lowest and f32 highest place (equal: without end); f32
+ * resolution; f32 greatest force of the motor, N for mm, N m for radians, 0: no motor.
+ *
+ * Kinds of axes, and what is positive:
+ *
+ * - 1 wire, 3 catheter: advance (mm): into the patient
+ * - 2 wire, 4 catheter: turning (radian): clockwise, seen in the forward direction
+ * - 5 syringe (mL): pushed out
+ * - 6 C-arm primary (radian): LAO
+ * - 7 C-arm secondary (radian): cranial
+ * - 8 source to detector (mm): away from the source
+ * - 9, 10, 11 table (mm): isocentre to the patient's left, back, head
+ * - 12 indeflator (atm): pressure
+ * - 0 and unknown kinds: present, but moves nothing
+ *
+ * Only kinds 1 to 4 have motors in this version. Counts are absolute. They may start anywhere and
+ * wrap: only differences count, so a lost state loses nothing. The frame's time is when they were
+ * taken. Forces act on the hand, positive in the positive direction of the axis: negative against
+ * a wire that is pushed in. After ZERO the device counts from 0 at the current place, and sends
+ * ZERO_ACK before the first state that does. It answers a CALIB with the CALIB in effect, and may
+ * send one by itself. Neither moves anything in the simulation.
+ */
 #ifndef DynamicCoronary_DeviceProtocol_h
 #define DynamicCoronary_DeviceProtocol_h
 
