@@ -48,7 +48,7 @@ struct SweptLumen::Build
   std::vector<Link> links;
   std::map<std::int64_t, std::vector<Incidence>> incidences;
   std::map<std::int64_t, int> treeOfNode;
-  std::vector<std::int64_t> extended;          ///< end points that were moved outwards
+  std::vector<std::int64_t> extended;                  ///< end points that were moved outwards
   std::set<std::tuple<int, bool, std::string>> mended; ///< group, at its start, what was done
   /// Where vessels meet: numbers and arc lengths of the vessels, one for each first junction.
   struct Node
