@@ -189,29 +189,33 @@ public:
     {
       return {};
     }
+    WalledFit one;
+    one.lumen = one.wall = alone;
     std::array<double, Rays> around;
     std::array<char, Rays> counts;
-    for (int round = 0; round < 5; ++round)
+    std::array<double, Rays> aroundOne;
+    std::array<char, Rays> countsOne;
+    if (!this->MeasureAround(section, alone, aroundOne, countsOne))
+    {
+      return {};
+    }
+    constexpr int rounds = 4;
+    for (int round = 0; round < rounds; ++round)
     {
       if (!this->MeasureAround(section, fit.wall, around, counts) ||
         !this->SolveWalled(section, prior, widest, around, counts, fit))
       {
         return {};
       }
+      // What is not on the way to a better fit is given up.
+      const double better = round + 1 < rounds ? 1.0 : WallBetter;
+      fit.lumen.misfit = this->MisfitOf(section, fit, around, counts, fit);
+      if (fit.lumen.misfit > better * this->MisfitOf(section, one, aroundOne, counts, fit))
+      {
+        return {};
+      }
     }
-    const double misfit = this->MisfitOf(section, fit, around, counts, fit);
-    WalledFit one;
-    one.lumen = one.wall = alone;
-    std::array<double, Rays> aroundOne;
-    std::array<char, Rays> countsOne;
-    if (!this->MeasureAround(section, alone, aroundOne, countsOne) ||
-      misfit > WallBetter * this->MisfitOf(section, one, aroundOne, counts, fit))
-    {
-      return {};
-    }
-    const double thick = fit.wall.radius - fit.lumen.radius;
-    fit.lumen.found = thick > MinimumWall;
-    fit.lumen.misfit = misfit;
+    fit.lumen.found = fit.wall.radius - fit.lumen.radius > MinimumWall;
     return fit.lumen;
   }
 
