@@ -54,6 +54,8 @@ tables=(
   "scanned | scripts/validate-scanned.py --build BUILD --output OUTPUT | scripts/validate-scanned.py --quick --build BUILD --output OUTPUT"
   "reconstructor | validate-reconstructor | validate-reconstructor --quick"
   "peers | scripts/validate-peers.py --build BUILD --output OUTPUT | scripts/validate-peers.py --quick --build BUILD --output OUTPUT"
+  "wall-speed | vessel-wall-benchmark --strict --benchmark_filter=^Refit --benchmark_repetitions=5 | vessel-wall-benchmark --benchmark_filter=^Refit --benchmark_min_time=0.01"
+  "tick-speed | intervention-benchmark --strict --benchmark_filter=^Tick --benchmark_repetitions=3 | intervention-benchmark --benchmark_filter=^RodAlone --benchmark_min_time=0.01"
   "simulator | scripts/validate-simulator.sh BUILD | scripts/validate-simulator.sh --quick BUILD"
 )
 
@@ -127,8 +129,8 @@ for table in "${tables[@]}"; do
   program="${command%% *}"
   if [[ "$program" != scripts/* && ! -x "$build/bin/$program" ]]; then
     # Needs Google's benchmark library, which only developers have.
-    if [ "$program" = skin-deformation-benchmark ] && [ ${#wanted[@]} -eq 0 ]; then
-      echo "validate: without skin-deformation, its program was not built" >&2
+    if [[ "$program" =~ ^(skin-deformation|vessel-wall|intervention)-benchmark$ ]] && [ ${#wanted[@]} -eq 0 ]; then
+      echo "validate: without $name, its program was not built" >&2
       continue
     fi
     # All of them are looked for first: nobody wants to hear of it after an hour.

@@ -129,9 +129,6 @@ public:
   double SegmentResistance(int segment) const { return this->Losses[segment].linear; }
   /// Of a tip: R1 + R2.
   double OutletResistance(int node) const { return this->OutletResistance_[node]; }
-  double CompliancePressure(int node) const { return this->Compartment[node]; } ///< mmHg
-  /// Of the ventricle's pressure.
-  double MyocardialFraction(int tree) const { return this->Fraction[tree]; }
   /// Segments of the path that a tree is calibrated at, and how many mm of it.
   const std::vector<int>& ReferencePath(int tree) const { return this->Path[tree]; }
   std::size_t NumberOfStenoses() const { return this->Stenoses.size(); }

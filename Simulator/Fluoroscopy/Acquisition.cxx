@@ -87,22 +87,10 @@ void ExposureClock::SetFluoroscopyRate(FrameRate rate)
   this->Settings_.fluoroscopyRate = rate;
 }
 
-void ExposureClock::SetCineRate(FrameRate rate)
-{
-  RequireRate("frame rate of cine", rate);
-  this->Settings_.cineRate = rate;
-}
-
 void ExposureClock::SetFieldArea(double area)
 {
   RequireFieldArea(area);
   this->Settings_.fieldArea = area;
-}
-
-void ExposureClock::SetDoseFactor(double factor)
-{
-  RequireSetting(factor >= 0.1 && factor <= 10.0, "factor of the dose", factor, "0.1 to 10");
-  this->DoseFactor = factor;
 }
 
 bool ExposureClock::Step(bool fluoroscopy, bool cine, bool mask)
@@ -153,8 +141,7 @@ void ExposureClock::Switch(BeamState wanted)
 
 void ExposureClock::Expose(bool cine)
 {
-  const double kerma =
-    this->DoseFactor * (cine ? this->Settings_.cineKerma : this->Settings_.fluoroscopyKerma);
+  const double kerma = cine ? this->Settings_.cineKerma : this->Settings_.fluoroscopyKerma;
   this->Last_.tick = this->Ticks;
   this->Last_.frame = this->Frames++;
   this->Last_.sequence = this->Sequence;
@@ -206,9 +193,10 @@ std::uint64_t ExposureClock::StateHash() const
   {
     hash = Hashed(value, hash);
   }
-  for (const double value : { this->DoseFactor, this->Settings_.fieldArea,
-         this->Counters[0].airKerma, this->Counters[0].doseAreaProduct, this->Counters[1].airKerma,
-         this->Counters[1].doseAreaProduct })
+  // 1 is where recordings had a factor of the dose, which nothing changed.
+  for (const double value :
+    { 1.0, this->Settings_.fieldArea, this->Counters[0].airKerma, this->Counters[0].doseAreaProduct,
+      this->Counters[1].airKerma, this->Counters[1].doseAreaProduct })
   {
     hash = Hashed(value, hash);
   }

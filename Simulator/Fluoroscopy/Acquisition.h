@@ -90,12 +90,8 @@ public:
   bool Radiating() const { return this->Beam != Off; } ///< a pedal was down at the last tick
 
   void SetFluoroscopyRate(FrameRate rate);
-  void SetCineRate(FrameRate rate);
   /// cm^2 at the reference point. @throws std::invalid_argument
   void SetFieldArea(double area);
-  /// Output of the tube relative to the settings, 0.1 to 10: for thicker patients or steeper angles.
-  /// @throws std::invalid_argument
-  void SetDoseFactor(double factor);
 
   const AcquisitionSettings& Settings() const { return this->Settings_; }
   DoseCounters Fluoroscopy() const { return this->Counted(0); }
@@ -118,7 +114,6 @@ private:
   DoseCounters Counted(int kind) const;
 
   AcquisitionSettings Settings_;
-  double DoseFactor = 1.0;
   BeamState Beam = Off;
   bool MaskWasDown = false;
   bool MaskWanted = false;

@@ -44,7 +44,7 @@ void DeviceMux::Start(const ViewPlace& view)
 
 void DeviceMux::Place(const ViewPlace& view)
 {
-  const PlaceArray wanted{ 0, 0, 0, 0, 0, view.primary, view.secondary, view.sourceToDetector,
+  const AxisPlaces wanted{ 0, 0, 0, 0, 0, view.primary, view.secondary, view.sourceToDetector,
     view.table[0], view.table[1], view.table[2] };
   const GroupPlaces& places = GroupTable[ViewGroup];
   for (std::size_t n = places.first; n < places.end; ++n)

@@ -60,18 +60,14 @@ public:
   /// From one other thread: moves the view there at the next tick, as a button for a standard view does.
   void PlaceView(const ViewPlace& view) { this->WantedView.Write(view); }
 
-  const std::vector<std::shared_ptr<Device>>& Devices() const { return this->All; }
-
   /// Any thread. @param group  0 wire, 1 catheter, 2 syringe, 3 view  @return number of the device it follows, or -1
   int Follows(std::size_t group) const { return this->Owner.at(group).load(); }
 
 private:
-  using PlaceArray = AxisPlaces;
-
   /// One device's hold on one group.
   struct Hand
   {
-    PlaceArray reference{};    ///< where it was when it was last seen to move
+    AxisPlaces reference{};    ///< where it was when it was last seen to move
     std::uint64_t restsAt = 0; ///< tick
     bool seen = false;
     bool moves = false;
@@ -81,7 +77,7 @@ private:
   struct Source
   {
     InputFrame frame;
-    PlaceArray places{};
+    AxisPlaces places{};
     bool noisy = false;
     std::array<Hand, Groups> hands;
 
@@ -102,8 +98,8 @@ private:
   std::array<std::atomic<int>, Groups> Owner{ { { -1 }, { -1 }, { -1 }, { -1 } } };
   std::array<bool, Groups> Held{};  ///< its device is lost
   std::array<bool, Groups> Begun{}; ///< has followed a device
-  PlaceArray Now = PlacesOf(SessionInput());
-  PlaceArray Offset{}; ///< of the device that each place follows
+  AxisPlaces Now = PlacesOf(SessionInput());
+  AxisPlaces Offset{}; ///< of the device that each place follows
   std::uint64_t RestTicks = 0;
   SessionInput Output;
   TripleBuffer<ViewPlace> WantedView;

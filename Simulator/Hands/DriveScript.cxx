@@ -15,6 +15,7 @@ namespace
 constexpr std::size_t MostPieces = 100000;
 constexpr double LongestPiece = 36000.0; // s
 constexpr double MaximumHeartRate = 240.0;
+constexpr double FurthestOfOld = 1e6; // mm, degrees, mL
 
 std::uint32_t PedalsOf(JsonFields& fields)
 {
@@ -43,27 +44,29 @@ std::uint32_t PedalsOf(JsonFields& fields)
   return pedals;
 }
 
-DrivePiece PieceOf(JsonFields& member)
+DrivePiece PieceOf(JsonFields& member, PiecesOf form)
 {
   DrivePiece piece;
   piece.seconds = member.Number("seconds", 0.0, LongestPiece);
   for (std::size_t axis = 0; axis < HandAxes; ++axis)
   {
     const HandAxis& one = HandAxisTable[axis];
-    const double least = one.kind == AxisKind::Syringe ? 0.0 : -one.scriptMost;
-    piece.change[axis] = one.scriptUnit * member.Number(one.scripted, least, one.scriptMost, 0.0);
+    const bool isSyringe = one.kind == AxisKind::Syringe;
+    const bool isOld = form == PiecesOf::OldDevice;
+    const double most = isOld ? FurthestOfOld : one.scriptMost;
+    piece.change[axis] = one.scriptUnit *
+      member.Number(isSyringe && isOld ? "syringe_mL" : one.scripted,
+        isSyringe && !isOld ? 0.0 : -most, most, 0.0);
   }
-  piece.setsPedals = member.Has("pedals");
-  piece.pedals = piece.setsPedals ? PedalsOf(member) : 0U;
+  const bool hasPedals = member.Has("pedals");
+  piece.setsPedals = hasPedals || form == PiecesOf::OldDevice;
+  piece.pedals = hasPedals ? PedalsOf(member) : 0U;
   piece.setsHeartRate = member.Has("heart_rate_bpm");
   piece.heartRate = member.Number("heart_rate_bpm", 0.0, MaximumHeartRate, 0.0);
   member.Done();
   return piece;
 }
-}
 
-namespace
-{
 void Move(AxisPlaces& places, const AxisPlaces& change, double share)
 {
   for (std::size_t axis = 0; axis < HandAxes; ++axis)
@@ -87,6 +90,11 @@ DriveScript::DriveScript(std::vector<DrivePiece> pieces)
   start.pedals = 0;
   this->Starts.push_back(start);
   this->Total = start.time;
+}
+
+AxisPlaces DriveScript::Moved() const
+{
+  return this->Starts.empty() ? AxisPlaces{} : this->Starts.back().moved;
 }
 
 std::uint64_t DriveScript::Ticks(double tickRate) const
@@ -136,12 +144,8 @@ std::vector<double> DriveScript::HeartRates(double from, double to) const
   return rates;
 }
 
-DriveScript DriveScriptFromText(const std::string& text, const std::string& origin)
+DriveScript DriveScriptOf(JsonFields& fields, PiecesOf form)
 {
-  const nlohmann::json json = ParseBoundedJson(text, origin);
-  JsonFields fields(json, origin);
-  fields.RequireFormat("dynamiccoronary script", "script of driving");
-  fields.Text("description", "");
   std::vector<DrivePiece> pieces;
   for (const nlohmann::json& entry : fields.List("pieces"))
   {
@@ -149,11 +153,25 @@ DriveScript DriveScriptFromText(const std::string& text, const std::string& orig
     {
       fields.Refuse("has more than " + std::to_string(MostPieces) + " pieces");
     }
-    JsonFields member(entry, origin + ", piece " + std::to_string(pieces.size() + 1));
-    pieces.push_back(PieceOf(member));
+    JsonFields member(entry, fields.Where() + ", piece " + std::to_string(pieces.size() + 1));
+    pieces.push_back(PieceOf(member, form));
+  }
+  return DriveScript(std::move(pieces));
+}
+
+DriveScript DriveScriptFromText(const std::string& text, const std::string& origin)
+{
+  const nlohmann::json json = ParseBoundedJson(text, origin);
+  JsonFields fields(json, origin);
+  fields.RequireFormat("dynamiccoronary script", "script of driving");
+  fields.Text("description", "");
+  DriveScript script = DriveScriptOf(fields);
+  if (fields.Has("device"))
+  {
+    fields.Object("device"); // is the emulated device's
   }
   fields.Done();
-  return DriveScript(std::move(pieces));
+  return script;
 }
 
 DriveScript ReadDriveScript(const std::string& path)

@@ -13,6 +13,8 @@
 
 namespace coronary
 {
+class JsonFields;
+
 /// Even motion for some seconds; changes are against the end of the piece before.
 struct DrivePiece
 {
@@ -31,6 +33,7 @@ public:
   explicit DriveScript(std::vector<DrivePiece> pieces);
 
   double Duration() const { return this->Total; } ///< s
+  AxisPlaces Moved() const;                       ///< from its start to its end
   std::uint64_t Ticks(double tickRate) const;     ///< after which it is over
 
   /// Where hands, feet and C-arm are, `seconds` after the start; after the end they rest, off the pedals.
@@ -52,6 +55,16 @@ private:
   std::vector<Start> Starts; ///< one more than pieces
   double Total = 0.0;
 };
+
+/// Where a script has its pieces.
+enum class PiecesOf
+{
+  Script,
+  OldDevice ///< device scenarios, once a format of their own: 'syringe_mL', pedals held during their piece only
+};
+
+/// @throws std::invalid_argument naming file, piece and member
+DriveScript DriveScriptOf(JsonFields& fields, PiecesOf form = PiecesOf::Script);
 
 ///@{
 /// @throws std::runtime_error naming the file: not there, no JSON; std::invalid_argument naming file, piece and member

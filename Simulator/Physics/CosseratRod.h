@@ -90,9 +90,8 @@ struct RodSettings
   /// mm by which a segment may move across in a step, beside what the walls carry it: a rod that snaps over takes
   /// several steps for it. 0: any way. For rods that are so light that nothing else slows them down.
   double trust = 0.0;
-  bool mediumFollowsWalls =
-    false;               ///< the medium moves as the walls around it, not as SetMedium says
-  bool tipSample = true; ///< and the free end of the first segment
+  bool mediumFollowsWalls = false; ///< the medium moves as the walls around it; otherwise it rests
+  bool tipSample = true;           ///< and the free end of the first segment
 
   /// @throws std::invalid_argument naming the setting
   void Validate() const;
@@ -124,7 +123,6 @@ public:
     return this->Bodies[i].orientation;
   }
   const Vector3& Velocity(std::int64_t i) const { return this->Bodies[i].velocity; }
-  const Vector3& AngularVelocity(std::int64_t i) const { return this->Bodies[i].turning; }
   Vector3 Axis(std::int64_t i) const; ///< unit
   Vector3 FirstEnd(std::int64_t i) const;
   Vector3 LastEnd(std::int64_t i) const;
@@ -154,8 +152,6 @@ public:
   void SetForce(std::int64_t i, const Vector3& force) { this->Bodies[i].force = force; }
   void SetTorque(std::int64_t i, const Vector3& torque) { this->Bodies[i].torque = torque; }
   ///@}
-  /// Velocity of the medium around a segment, mm/s; until set again.
-  void SetMedium(std::int64_t i, const Vector3& velocity) { this->Bodies[i].medium = velocity; }
 
   /**
    * @param seconds  positive

@@ -689,11 +689,6 @@ void VesselWall::Forget(std::int64_t sample)
   this->Data->Memories.erase(sample);
 }
 
-void VesselWall::ForgetAll()
-{
-  this->Data->Memories.clear();
-}
-
 WallPlace VesselWall::Closest(const Vector3& p)
 {
   if (!UsableWallPoint(p))

@@ -116,7 +116,6 @@ public:
   /// Beside another sample, whose part of the wall it gets; false if that is not known.
   bool PlaceBeside(std::int64_t sample, std::int64_t neighbour);
   void Forget(std::int64_t sample);
-  void ForgetAll();
   ///@}
 
   ///@{

@@ -337,14 +337,17 @@ struct VesselWall::Internals
   void Build(const WallTopology& topology, const std::vector<Vector3>& points);
   void BuildPatches();
   /// @return its coordinates relative to the tree's centre
-  const Eigen::Array4f& SetNext(std::size_t vertex, const Vector3& p)
+  Eigen::Array4f SetNext(std::size_t vertex, const Vector3& p)
   {
     WallVertex& v = this->Vertices[vertex];
     v.now = v.next;
     v.next = p;
     const Vector3 relative = p - this->Tree.Centre();
-    this->Coordinates[vertex] << relative.cast<float>().array(), 0.0f;
-    return this->Coordinates[vertex];
+    // In one piece: four numbers that are written one by one can not be read at once for a while.
+    const Eigen::Array4f coordinates(static_cast<float>(relative[0]),
+      static_cast<float>(relative[1]), static_cast<float>(relative[2]), 0.0f);
+    this->Coordinates[vertex] = coordinates;
+    return coordinates;
   }
   /// Puts boxes around the vertices that come next.
   void Refit();

@@ -1,24 +1,16 @@
-// Vessels for the tests of flow and contrast medium, and the rows of docs/contrast.md.
+// Vessels for the tests of flow and contrast medium.
 #ifndef ContrastTestData_h
 #define ContrastTestData_h
 
 #include "CoronaryPhantom.h"
+#include "TableRow.h"
 #include "WallMotions.h"
 
-#include <cstdio>
 #include <string>
 #include <vector>
 
 namespace coronary
 {
-// A line of the table in docs/contrast.md; scripts/validate-simulator.sh collects them.
-inline void Row(const std::string& what, double wanted, double measured, const char* tolerance)
-{
-  std::printf("| %s | %.6g | %.6g | %s | %s |\n", what.c_str(), wanted, measured,
-    wanted != 0.0 ? (std::to_string(100.0 * (measured / wanted - 1.0)) + " %").c_str() : "",
-    tolerance);
-}
-
 /// A straight branch along `direction`, radius linear from `begin` to `end` mm; returns its index.
 inline int AddBranch(WallTopology& topology, int parent, const Vector3& from,
   const Vector3& direction, double length, double begin, double end, int intervals,

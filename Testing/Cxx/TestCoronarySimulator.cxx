@@ -1,6 +1,7 @@
 // coronary-simulator as a user runs it: sessions, recordings and their replay, messages, exit codes.
 #include "AtomicFile.h"
 #include "FileSeries.h"
+#include "SimulatorRun.h"
 #include "VesselTestData.h"
 
 #include "vtkXMLPolyDataReader.h"
@@ -13,10 +14,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <sstream>
-#include <sys/wait.h>
-#include <unistd.h>
 
 namespace fs = std::filesystem;
 using nlohmann::json;
@@ -25,18 +23,12 @@ namespace
 {
 constexpr int Bones = 12;
 
-std::string ReadText(const fs::path& path)
-{
-  std::ifstream file(path, std::ios::binary);
-  return { std::istreambuf_iterator<char>(file), {} };
-}
-
-class TestCoronarySimulator : public ::testing::Test
+class TestCoronarySimulator : public SimulatorRun
 {
 protected:
-  void SetUp() override
+  TestCoronarySimulator()
+    : SimulatorRun("simulator test")
   {
-    this->Folder = fs::temp_directory_path() / ("simulator test." + std::to_string(getpid()));
     SaveChainRun(this->Folder / "result", Bones);
     this->Put("s.json", TestScenario());
     this->Put("drive.json",
@@ -46,27 +38,11 @@ protected:
             { { "seconds", 0.3 }, { "wire_mm", 3 }, { "heart_rate_bpm", 100 } } } } });
   }
 
-  void TearDown() override { fs::remove_all(this->Folder); }
-
   static json TestScenario()
   {
     return { { "format", "dynamiccoronary scenario" }, { "version", 1 }, { "name", "bar" },
       { "vessels", { { "run", "result" } } }, { "artery", "RCA" }, { "wire", "workhorse" },
       { "catheter", "JR4-6F" }, { "settings", { { "heart_rate_bpm", 60 } } } };
-  }
-
-  void Put(const std::string& name, const json& content) const
-  {
-    coronary::WriteFileAtomically((this->Folder / name).string(), content.dump());
-  }
-
-  /// Runs the program in the folder.
-  int Run(const std::string& options, const std::string& before = "") const
-  {
-    const std::string command = "cd '" + this->Folder.string() + "' && " + before +
-      " '" DYNAMICCORONARY_SIMULATOR "' " + options + " >stdout 2>stderr";
-    const int status = std::system(command.c_str());
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
 
   std::string Said() const { return ReadText(this->Folder / "stderr"); }
@@ -96,8 +72,6 @@ protected:
     this->Put("changed.json", scenario);
     this->ExpectFailure(1, "--scenario changed.json --ticks 10", part);
   }
-
-  fs::path Folder;
 };
 }
 

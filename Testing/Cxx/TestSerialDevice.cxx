@@ -48,8 +48,8 @@ double SecondsSince(std::uint64_t start)
 class Hardware
 {
 public:
-  explicit Hardware(const std::string& scenario = "{}")
-    : Device(ScenarioOf(scenario))
+  explicit Hardware(const std::string& script = R"(,"pieces":[])")
+    : Device(ScenarioOf(script))
     , Link(std::filesystem::temp_directory_path() /
         ("coronary-device-" + std::to_string(::getpid()) + "-" + std::to_string(++Count)))
     , Thread([this] { this->Run(); })
@@ -79,9 +79,8 @@ public:
 private:
   static DeviceScenario ScenarioOf(const std::string& members)
   {
-    const std::string head = R"({"format":"dynamiccoronary device scenario","version":1)";
     return DeviceScenarioFromText(
-      head + (members == "{}" ? "}" : "," + members.substr(1)), "the test's scenario");
+      R"({"format":"dynamiccoronary script","version":1)" + members + "}", "the test's script");
   }
 
   void Plug()
@@ -313,8 +312,8 @@ TEST(SerialDevice, WrongDevice)
 
 TEST(SerialDevice, DrivesByteByByteWithJunk)
 {
-  Hardware hardware(R"({"pieces":[{"seconds":0.3},{"seconds":1,"wire_mm":20,"pedals":["cine"]}],
-    "faults":[{"at":0.2,"kind":"garbage","count":300},{"at":0.4,"kind":"duplicate","count":5},
+  Hardware hardware(R"(,"pieces":[{"seconds":0.3},{"seconds":1,"wire_mm":20,"pedals":["cine"]}],
+    "device":{"faults":[{"at":0.2,"kind":"garbage","count":300},{"at":0.4,"kind":"duplicate","count":5},
               {"at":0.6,"kind":"reorder","count":3}]})");
   hardware.byteByByte = true;
   Loop loop(std::make_shared<SerialDevice>(hardware.Path()));
@@ -329,7 +328,7 @@ TEST(SerialDevice, DrivesByteByByteWithJunk)
 TEST(SerialDevice, PulledOutAndBack)
 {
   Hardware hardware(
-    R"({"repeat":true,"pieces":[{"seconds":1,"wire_mm":20,"syringe_mL":1,"pedals":["fluoroscopy"]}]})");
+    R"(,"device":{"repeat":true},"pieces":[{"seconds":1,"wire_mm":20,"inject_mL":1,"pedals":["fluoroscopy"]}])");
   Loop loop(std::make_shared<SerialDevice>(hardware.Path()));
   loop.force.wireForce = -1.0;
   ASSERT_TRUE(loop.Reaches(DeviceState::Running));
@@ -482,10 +481,9 @@ TEST(Emulator, AsAProgram)
     std::filesystem::temp_directory_path() / ("coronary-emulator-" + std::to_string(::getpid()));
   std::filesystem::create_directories(folder);
   const std::filesystem::path link = folder / "device";
-  std::ofstream(folder / "scenario.json")
-    << R"({"format":"dynamiccoronary device scenario","version":1,
+  std::ofstream(folder / "scenario.json") << R"({"format":"dynamiccoronary script","version":1,
     "pieces":[{"seconds":1.0},{"seconds":4.0,"wire_mm":10}],
-    "faults":[{"at":6.0,"kind":"close","ms":300}]})";
+    "device":{"faults":[{"at":6.0,"kind":"close","ms":300}]}})";
   EmulatorProcess emulator({ "--quiet", "--scenario", (folder / "scenario.json").string(), "--link",
     link.string(), "--log", (folder / "log").string() });
   {

@@ -1,5 +1,6 @@
 // The rod against closed forms: bending, buckling, torsion, shape, contact and friction.
 #include "CosseratRod.h"
+#include "TableRow.h"
 
 #include <gtest/gtest.h>
 
@@ -13,14 +14,6 @@ using namespace coronary;
 namespace
 {
 constexpr double Pi = 3.14159265358979323846;
-
-// A line of the table in docs/simulator.md; scripts/validate-simulator.sh collects them.
-void Row(const char* what, double wanted, double measured, const char* tolerance)
-{
-  std::printf("| %s | %.6g | %.6g | %s | %s |\n", what, wanted, measured,
-    wanted != 0.0 ? (std::to_string(100.0 * (measured / wanted - 1.0)) + " %").c_str() : "",
-    tolerance);
-}
 
 struct Material
 {

@@ -6,6 +6,7 @@
 #include "Fnv1a.h"
 #include "KernelChoice.h"
 #include "Refusals.h"
+#include "TableRow.h"
 
 #include <gtest/gtest.h>
 
@@ -19,14 +20,6 @@ using namespace coronary;
 
 namespace
 {
-// A line of the table in docs/fluoroscopy-image.md, as UnitTestCosseratRod prints them.
-void Row(const std::string& what, double wanted, double measured, const char* tolerance)
-{
-  std::printf("| %s | %.6g | %.6g | %s | %s |\n", what.c_str(), wanted, measured,
-    wanted != 0.0 ? (std::to_string(100.0 * (measured / wanted - 1.0)) + " %").c_str() : "",
-    tolerance);
-}
-
 struct Moments
 {
   double mean = 0.0;

@@ -876,10 +876,11 @@ TEST(ReplayDevice, AsItWasRecorded)
 
 namespace
 {
-DeviceScenario ScenarioOf(const std::string& members)
+DeviceScenario ScenarioOf(const std::string& device, const std::string& pieces = "")
 {
-  return DeviceScenarioFromText(
-    R"({"format":"dynamiccoronary device scenario","version":1)" + members + "}", "'test'");
+  return DeviceScenarioFromText(R"({"format":"dynamiccoronary script","version":1,"pieces":[)" +
+      pieces + R"(],"device":{)" + device + "}}",
+    "'test'");
 }
 
 /// What a host sees of a scenario in its first 2 s.
@@ -890,24 +891,24 @@ struct Seen
   bool wasUnplugged = false;
 };
 
-Seen Watch(const std::string& members, double seconds = 2.0)
+Seen Watch(const std::string& device, double seconds = 2.0)
 {
-  ScriptedDevice device(ScenarioOf(members));
+  ScriptedDevice emulated(ScenarioOf(device));
   FrameSender host;
   FrameDecoder decoder;
   Seen seen;
   const auto say = [&](const Message& message, std::uint64_t now)
   {
     const WireFrame wire = host.Send(message, now);
-    device.Device().Receive(wire.bytes.data(), wire.size, now);
+    emulated.Device().Receive(wire.bytes.data(), wire.size, now);
   };
   say(Encode(HelloMessage{ 1, 1, 42, "test" }), 0);
   say(Encode(StartMessage{ 1000, 20, 42 }), 0);
   for (std::uint64_t now = 0; now < static_cast<std::uint64_t>(1e6 * seconds); now += 500)
   {
-    device.Step(now);
-    seen.wasUnplugged = seen.wasUnplugged || !device.IsPlugged();
-    for (const std::uint8_t byte : device.TakeBytes())
+    emulated.Step(now);
+    seen.wasUnplugged = seen.wasUnplugged || !emulated.IsPlugged();
+    for (const std::uint8_t byte : emulated.TakeBytes())
     {
       StateMessage state;
       if (decoder.Push(byte) && Decode(decoder.Last(), state))
@@ -926,60 +927,86 @@ TEST(Emulator, Faults)
   const Seen good = Watch("");
   EXPECT_EQ(good.states.size(), 2000U);
   EXPECT_EQ(good.counts.damaged + good.counts.lost + good.counts.repeated, 0U);
-  const Seen dropped = Watch(R"(,"faults":[{"at":1,"kind":"drop_bytes","count":10}])");
+  const Seen dropped = Watch(R"("faults":[{"at":1,"kind":"drop_bytes","count":10}])");
   EXPECT_EQ(dropped.counts.damaged, 1U);
   EXPECT_EQ(dropped.counts.lost, 1U);
-  const Seen flipped = Watch(R"(,"faults":[{"at":1,"kind":"flip_bits","count":20}])");
+  const Seen flipped = Watch(R"("faults":[{"at":1,"kind":"flip_bits","count":20}])");
   EXPECT_EQ(flipped.counts.lost, 20U);
   EXPECT_GE(flipped.counts.damaged, 20U);
-  const Seen twice = Watch(R"(,"faults":[{"at":1,"kind":"duplicate","count":20}])");
+  const Seen twice = Watch(R"("faults":[{"at":1,"kind":"duplicate","count":20}])");
   EXPECT_EQ(twice.counts.repeated, 20U);
   EXPECT_EQ(twice.states.size(), 2000U);
-  const Seen disordered = Watch(R"(,"faults":[{"at":1,"kind":"reorder","count":20}])");
+  const Seen disordered = Watch(R"("faults":[{"at":1,"kind":"reorder","count":20}])");
   EXPECT_EQ(disordered.counts.lost, 20U);
   EXPECT_EQ(disordered.counts.repeated, 20U);
-  const Seen garbage = Watch(R"(,"faults":[{"at":1,"kind":"garbage","count":5000}])");
+  const Seen garbage = Watch(R"("faults":[{"at":1,"kind":"garbage","count":5000}])");
   EXPECT_GE(garbage.counts.damaged, 5U);
   EXPECT_LE(garbage.counts.lost, 1U);
-  const Seen stopped = Watch(R"(,"faults":[{"at":1,"kind":"stop","ms":100}])");
+  const Seen stopped = Watch(R"("faults":[{"at":1,"kind":"stop","ms":100}])");
   EXPECT_EQ(stopped.counts.lost, 100U);
-  const Seen closed = Watch(R"(,"faults":[{"at":1,"kind":"close","ms":100}])");
+  const Seen closed = Watch(R"("faults":[{"at":1,"kind":"close","ms":100}])");
   EXPECT_TRUE(closed.wasUnplugged);
   EXPECT_NEAR(static_cast<double>(closed.states.size()), 1900.0, 1.0);
-  const Seen slow = Watch(R"(,"faults":[{"at":1,"kind":"rate","count":100}])");
+  const Seen slow = Watch(R"("faults":[{"at":1,"kind":"rate","count":100}])");
   EXPECT_NEAR(static_cast<double>(slow.states.size()), 1100.0, 2.0);
   const Seen jumped =
-    Watch(R"(,"first_count":7,"faults":[{"at":1,"kind":"jump_counts","count":-1000}])");
+    Watch(R"("first_count":7,"faults":[{"at":1,"kind":"jump_counts","count":-1000}])");
   EXPECT_EQ(jumped.states.front().counts[0], 7);
   EXPECT_EQ(jumped.states.back().counts[0], -993);
 }
 
-TEST(Emulator, ScenarioOfHands)
+TEST(Emulator, ScriptOfHands)
 {
-  const DeviceScenario scenario = ScenarioOf(R"(,"repeat":true,"pieces":[
-    {"seconds":1,"wire_mm":10,"wire_deg":180,"pedals":["fluoroscopy","mask"]},
-    {"seconds":1,"syringe_mL":2},{"seconds":0,"catheter_mm":3}])");
-  HandPlaces hands = scenario.At(0.5);
-  EXPECT_DOUBLE_EQ(hands.places[static_cast<std::size_t>(AxisKind::WireAdvance)], 5.0);
-  EXPECT_DOUBLE_EQ(hands.places[static_cast<std::size_t>(AxisKind::WireTurn)], M_PI / 2);
-  EXPECT_EQ(hands.pedals, FluoroscopyPedal | MaskPedal);
-  hands = scenario.At(5.5);
-  EXPECT_DOUBLE_EQ(hands.places[static_cast<std::size_t>(AxisKind::WireAdvance)], 30.0);
-  EXPECT_DOUBLE_EQ(hands.places[static_cast<std::size_t>(AxisKind::Syringe)], 5.0);
-  EXPECT_DOUBLE_EQ(hands.places[static_cast<std::size_t>(AxisKind::CatheterAdvance)], 6.0);
-  EXPECT_EQ(hands.pedals, 0U);
+  const auto check = [](const DeviceScenario& scenario, unsigned pedalsAfter)
+  {
+    HandPlaces hands = scenario.At(0.5);
+    EXPECT_DOUBLE_EQ(hands.places[static_cast<std::size_t>(AxisKind::WireAdvance)], 5.0);
+    EXPECT_DOUBLE_EQ(hands.places[static_cast<std::size_t>(AxisKind::WireTurn)], M_PI / 2);
+    EXPECT_EQ(hands.pedals, FluoroscopyPedal | MaskPedal);
+    hands = scenario.At(5.5);
+    EXPECT_DOUBLE_EQ(hands.places[static_cast<std::size_t>(AxisKind::WireAdvance)], 30.0);
+    EXPECT_DOUBLE_EQ(hands.places[static_cast<std::size_t>(AxisKind::Syringe)], 5.0);
+    EXPECT_DOUBLE_EQ(hands.places[static_cast<std::size_t>(AxisKind::CatheterAdvance)], 6.0);
+    EXPECT_EQ(hands.pedals, pedalsAfter);
+  };
+  const std::string first =
+    R"({"seconds":1,"wire_mm":10,"wire_deg":180,"pedals":["fluoroscopy","mask"]},)";
+  const std::string last = R"({"seconds":0,"catheter_mm":3})";
+  check(ScenarioOf(R"("repeat":true)", first + R"({"seconds":1,"inject_mL":2},)" + last),
+    FluoroscopyPedal | MaskPedal);
+  // The format that devices once had: pedals are up again after their piece, and the syringe has another name.
+  check(DeviceScenarioFromText(
+          R"({"format":"dynamiccoronary device scenario","version":1,"repeat":true,"pieces":[)" +
+            first + R"({"seconds":1,"syringe_mL":2},)" + last + "]}",
+          "'old'"),
+    0U);
+  EXPECT_EQ(DeviceScenarioFromText(
+              R"({"format":"dynamiccoronary device scenario","version":1,"rate_hz":500})", "'old'")
+              .device.rate,
+    500);
+  // The simulator drives by the same file.
+  const DriveScript script =
+    DriveScriptFromText(R"({"format":"dynamiccoronary script","version":1,"pieces":[)" + first +
+        last + R"(],"device":{"faults":[{"at":1,"kind":"close","ms":0}]}})",
+      "'both'");
+  EXPECT_DOUBLE_EQ(script.At(2.0).drive.catheterPosition, 3.0);
 }
 
-TEST(Emulator, WrongScenarios)
+TEST(Emulator, WrongScripts)
 {
-  ExpectRefusal([] { ScenarioOf(R"(,"pieces":[{"seconds":-1}])"); }, "'test', piece 1");
-  ExpectRefusal([] { ScenarioOf(R"(,"pieces":[{"seconds":1,"wire":1}])"); }, "'wire'");
-  ExpectRefusal([] { ScenarioOf(R"(,"pieces":[{"seconds":1,"pedals":["brake"]}])"); }, "'pedals'");
+  ExpectRefusal([] { ScenarioOf("", R"({"seconds":-1})"); }, "'test', piece 1");
+  ExpectRefusal([] { ScenarioOf("", R"({"seconds":1,"wire":1})"); }, "'wire'");
+  ExpectRefusal([] { ScenarioOf("", R"({"seconds":1,"pedals":["brake"]})"); }, "'pedals'");
+  ExpectRefusal([] { ScenarioOf("", R"({"seconds":1,"syringe_mL":1})"); }, "'syringe_mL'");
   ExpectRefusal(
-    [] { ScenarioOf(R"(,"faults":[{"at":1,"kind":"fire"}])"); }, "no fault that is known");
-  ExpectRefusal([] { ScenarioOf(R"(,"faults":[{"at":1,"kind":"stop"}])"); }, "'ms'");
-  ExpectRefusal([] { ScenarioOf(R"(,"faults":[{"at":1,"kind":"rate","count":0}])"); }, "'count'");
-  ExpectRefusal([] { ScenarioOf(R"(,"rate_hz":5000)"); }, "'rate_hz'");
+    [] { ScenarioOf(R"("faults":[{"at":1,"kind":"fire"}])"); }, "no fault that is known");
+  ExpectRefusal([] { ScenarioOf(R"("faults":[{"at":1,"kind":"stop"}])"); }, "'ms'");
+  ExpectRefusal([] { ScenarioOf(R"("faults":[{"at":1,"kind":"rate","count":0}])"); }, "'count'");
+  ExpectRefusal([] { ScenarioOf(R"("rate_hz":5000)"); }, "'rate_hz'");
+  ExpectRefusal([] { ScenarioOf(R"("colour":"red")"); }, "'test', device has 'colour'");
+  ExpectRefusal([]
+    { DeviceScenarioFromText(R"({"format":"dynamiccoronary scenario","version":1})", "'test'"); },
+    "is no script of driving");
 }
 
 TEST(KeyboardDevice, SpeedsAndSmoothness)

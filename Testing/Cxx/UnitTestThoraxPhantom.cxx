@@ -3,6 +3,7 @@
 #include "CoronaryPhantom.h"
 #include "Fnv1a.h"
 #include "Refusals.h"
+#include "TableRow.h"
 #include "ThoraxPhantom.h"
 
 #include <gtest/gtest.h>
@@ -18,14 +19,6 @@ using namespace coronary;
 
 namespace
 {
-// A line of the table in docs/fluoroscopy-image.md, as UnitTestCosseratRod prints them.
-void Row(const std::string& what, double wanted, double measured, const char* tolerance)
-{
-  std::printf("| %s | %.6g | %.6g | %s | %s |\n", what.c_str(), wanted, measured,
-    wanted != 0.0 ? (std::to_string(100.0 * (measured / wanted - 1.0)) + " %").c_str() : "",
-    tolerance);
-}
-
 const HounsfieldVolume& Thorax()
 {
   static const HounsfieldVolume volume = MakeThoraxPhantom();

@@ -375,9 +375,6 @@ TEST(VesselWall, DoesNotJumpToTheNeighbouringVessel)
   EXPECT_EQ(wall.BranchAt(sample), 0);
   wall.Forget(6);
   EXPECT_EQ(wall.BranchAt(sample), 1);
-  wall.ForgetAll();
-  sample.index = 3;
-  EXPECT_EQ(wall.BranchAt(sample), 1);
 }
 
 TEST(VesselWall, NarrowLumenHasTwoPlanesWithLastingIdentities)

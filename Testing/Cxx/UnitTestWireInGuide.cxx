@@ -1,6 +1,7 @@
 // A wire in a bent guide: pressed on by its stiffness, its axial force and its curvature at rest, against closed forms.
 
 #include "InstrumentCatalogue.h"
+#include "TableRow.h"
 #include "WireInGuide.h"
 
 #include <gtest/gtest.h>
@@ -73,12 +74,6 @@ void Turn(WireInGuide& wire, double force, double from, double to, double step =
   }
 }
 
-void Print(const char* what, double expected, double measured, const char* tolerance)
-{
-  std::printf("| %s | %.5g | %.5g | %.3f %% | %s |\n", what, expected, measured,
-    100.0 * (measured / expected - 1.0), tolerance);
-}
-
 TEST(WireInGuide, IsTheCapstanForPushAndPullAtBothEnds)
 {
   const GuideCatheter guide = BuiltInCatalogue().Catheter("JL4-6F").catheter;
@@ -99,7 +94,7 @@ TEST(WireInGuide, IsTheCapstanForPushAndPullAtBothEnds)
     }
   }
   EXPECT_LT(worst, 1e-3);
-  Print("wire in a JL4 guide pushed and pulled, 0.005 to 5 N: hand's force over capstan's (worst)",
+  Row("wire in a JL4 guide pushed and pulled, 0.005 to 5 N: hand's force over capstan's (worst)",
     1.0, 1.0 + worst, "0.1 %");
 }
 
@@ -125,7 +120,7 @@ TEST(WireInGuide, ItsStiffnessPressesItOntoALongBend)
     EXPECT_LT(std::abs(force), 0.1 * expected * std::exp(0.1 * TurnOf(guide)));
     if (way > 0.0)
     {
-      Print("stiff wire in a long bend: N in all on the guide's walls", expected, wire.Pressing(),
+      Row("stiff wire in a long bend: N in all on the guide's walls", expected, wire.Pressing(),
         "3 %");
     }
   }
@@ -144,7 +139,7 @@ TEST(WireInGuide, ItsStiffnessPressesItOntoAShortBend)
     Guide({ { 60.0, 0.0, 0.0 }, { length, angle / length, 0.3 }, { 60.0, 0.0, 0.0 } }, 0.1), 0.0);
   Slide(wire, 0.0, 0.01);
   EXPECT_NEAR(wire.Pressing(), expected, 0.03 * expected);
-  Print(
+  Row(
     "stiff wire in a short bend: N in all on the guide's walls", expected, wire.Pressing(), "3 %");
 }
 
@@ -169,7 +164,7 @@ TEST_F(Lag, TheFarEndLagsByWhatFrictionTwists)
   EXPECT_NEAR(wire.AtHand().force, Force, 1e-9) << "it slides around, not along";
   const double lag = 6.0 - wire.Angle();
   EXPECT_NEAR(lag, Expected, 0.01 * Expected);
-  Print("turned in a bent guide: rad by which the far end lags", Expected, lag, "1 %");
+  Row("turned in a bent guide: rad by which the far end lags", Expected, lag, "1 %");
 
   // The other way round friction has to be reversed along all of it before the far end follows.
   const double before = wire.Angle();
@@ -279,8 +274,8 @@ TEST_F(Whip, AboveTheBifurcationTheFarEndJumps)
   }
   const double critical = 0.5 * (below + above);
   EXPECT_NEAR(critical, 0.5 * M_PI, 0.01 * 0.5 * M_PI);
-  Print("curved wire turned in a bent guide: length sqrt(EI k0 k / GJ) at which it whips",
-    0.5 * M_PI, critical, "1 %");
+  Row("curved wire turned in a bent guide: length sqrt(EI k0 k / GJ) at which it whips", 0.5 * M_PI,
+    critical, "1 %");
 
   // Half way round the far end hangs back by A, that of a pendulum whose quarter period is the number.
   for (const double number : { 1.65, 1.8, 2.2 })
@@ -340,7 +335,7 @@ TEST(WireInGuide, WorkIsHandedOnOrRubbedAway)
   EXPECT_GT(wire.Rubbed(), 0.2 * most);
   EXPECT_NEAR(in, out + wire.Rubbed() + kept, 0.01 * most)
     << in << " in, " << out << " out, " << wire.Rubbed() << " rubbed, " << kept << " kept";
-  Print("hand's work of 20 s, pushing, pulling and turning against a load, N mm", in,
+  Row("hand's work of 20 s, pushing, pulling and turning against a load, N mm", in,
     out + wire.Rubbed() + kept, "1 %");
 }
 

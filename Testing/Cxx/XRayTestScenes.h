@@ -1,33 +1,22 @@
 /**
  * @file XRayTestScenes.h
- * @brief C-arms, a body of ellipsoids, and the table that the X-ray tests print.
+ * @brief C-arms and a body of ellipsoids.
  */
 #ifndef DynamicCoronary_XRayTestScenes_h
 #define DynamicCoronary_XRayTestScenes_h
 
 #include "CArm.h"
 #include "ScalarImage.h"
+#include "TableRow.h"
 
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <vector>
 
 namespace coronary
 {
 constexpr double Degrees = 3.14159265358979323846 / 180.0;
-
-/// A line of the table in docs/fluoroscopy.md; scripts/validate-simulator.sh collects such lines.
-inline void Row(const char* what, double wanted, double measured, const char* tolerance)
-{
-  char off[64] = "";
-  if (wanted != 0.0)
-  {
-    std::snprintf(off, sizeof(off), "%.2g %%", 100.0 * (measured / wanted - 1.0));
-  }
-  std::printf("| %s | %.6g | %.6g | %s | %s |\n", what, wanted, measured, off, tolerance);
-}
 
 /// Angles in degrees; square pixels on 200 mm.
 inline CArmGeometry CArmAt(double primary, double secondary, int size = 512, double width = 200.0,

@@ -192,10 +192,11 @@ void ReadDeviceScenarioText(const std::string& bytes)
 
 std::vector<std::string> DeviceScenarioSeeds()
 {
-  return { R"({"format":"dynamiccoronary device scenario","version":1,)"
-           R"("pieces":[{"seconds":1,"wire_mm":5}],"repeat":true,)"
-           R"("faults":[{"at":0.5,"kind":"stop","milliseconds":100}]})",
-    R"({"format":"dynamiccoronary device scenario","version":1})" };
+  return { R"({"format":"dynamiccoronary script","version":1,)"
+           R"("pieces":[{"seconds":1,"wire_mm":5}],"device":{"repeat":true,)"
+           R"("faults":[{"at":0.5,"kind":"stop","ms":100}]}})",
+    R"({"format":"dynamiccoronary device scenario","version":1,)"
+    R"("pieces":[{"seconds":1,"syringe_mL":-5,"pedals":["cine"]}],"repeat":true})" };
 }
 }
 

@@ -1,7 +1,6 @@
 #include "DeviceScenario.h"
 
 #include "JsonFields.h"
-#include "SessionInput.h"
 #include "TextFile.h"
 
 #include <algorithm>
@@ -12,16 +11,7 @@ namespace coronary
 {
 namespace
 {
-constexpr std::size_t MostEntries = 100000;
-constexpr double Furthest = 1e6;
-
-struct PedalName
-{
-  const char* name;
-  Pedal bit;
-};
-constexpr PedalName Pedals[] = { { "fluoroscopy", FluoroscopyPedal }, { "cine", CinePedal },
-  { "mask", MaskPedal } };
+constexpr std::size_t MostFaults = 100000;
 
 struct FaultName
 {
@@ -43,45 +33,6 @@ constexpr FaultName Faults[] = { { "drop_bytes", FaultKind::DropBytes, true, fal
   { "garbage", FaultKind::Garbage, true, false, 1, 1000000 },
   { "wrong_version", FaultKind::WrongVersion, false, false, 0, 0 },
   { "wrong_magic", FaultKind::WrongMagic, false, false, 0, 0 } };
-
-std::uint16_t PedalsOf(JsonFields& fields)
-{
-  unsigned pedals = 0;
-  if (!fields.Has("pedals"))
-  {
-    return 0;
-  }
-  for (const nlohmann::json& entry : fields.List("pedals"))
-  {
-    const auto found = std::find_if(std::begin(Pedals), std::end(Pedals),
-      [&](const PedalName& one) { return entry == one.name; });
-    if (found == std::end(Pedals))
-    {
-      fields.Refuse("has other 'pedals' than \"fluoroscopy\", \"cine\" and \"mask\"");
-    }
-    pedals |= found->bit;
-  }
-  return static_cast<std::uint16_t>(pedals);
-}
-
-HandPiece PieceOf(const nlohmann::json& entry, const std::string& where)
-{
-  JsonFields fields(entry, where);
-  HandPiece piece;
-  piece.seconds = fields.Number("seconds", 0.0, 36000.0);
-  for (const HandAxis& axis : HandAxisTable)
-  {
-    if (axis.kind <= AxisKind::Secondary) // what the emulated device has
-    {
-      const char* name = axis.kind == AxisKind::Syringe ? "syringe_mL" : axis.scripted;
-      piece.change[static_cast<std::size_t>(axis.kind)] =
-        axis.scriptUnit * fields.Number(name, -Furthest, Furthest, 0.0);
-    }
-  }
-  piece.pedals = PedalsOf(fields);
-  fields.Done();
-  return piece;
-}
 
 DeviceFault FaultOf(const nlohmann::json& entry, const std::string& where)
 {
@@ -108,92 +59,93 @@ DeviceFault FaultOf(const nlohmann::json& entry, const std::string& where)
   return fault;
 }
 
-template <typename Entry, typename Reader>
-std::vector<Entry> EntriesOf(
-  JsonFields& fields, const char* name, const std::string& what, const Reader& read)
+/// What the device itself is, and what goes wrong with it.
+void ReadDevice(JsonFields& fields, const std::string& origin, DeviceScenario& scenario)
 {
-  std::vector<Entry> entries;
-  if (!fields.Has(name))
-  {
-    return entries;
-  }
-  for (const nlohmann::json& entry : fields.List(name))
-  {
-    if (entries.size() == MostEntries)
-    {
-      fields.Refuse("has more than " + std::to_string(MostEntries) + " '" + name + "'");
-    }
-    entries.push_back(
-      read(entry, fields.Where() + ", " + what + " " + std::to_string(entries.size() + 1)));
-  }
-  return entries;
-}
-
-void Add(HandPlaces& to, const HandPiece& piece, double share)
-{
-  for (std::size_t n = 0; n < to.places.size(); ++n)
-  {
-    to.places[n] += share * piece.change[n];
-  }
-}
-}
-
-HandPlaces DeviceScenario::At(double seconds) const
-{
-  HandPlaces hands;
-  HandPiece round;
-  for (const HandPiece& piece : this->pieces)
-  {
-    round.seconds += piece.seconds;
-    for (std::size_t n = 0; n < round.change.size(); ++n)
-    {
-      round.change[n] += piece.change[n];
-    }
-  }
-  double left = std::max(0.0, seconds);
-  if (this->repeat && round.seconds > 0.0)
-  {
-    const double rounds = std::floor(left / round.seconds);
-    Add(hands, round, rounds);
-    left -= rounds * round.seconds;
-  }
-  for (const HandPiece& piece : this->pieces)
-  {
-    if (left < piece.seconds)
-    {
-      Add(hands, piece, left / piece.seconds);
-      hands.pedals = piece.pedals;
-      return hands;
-    }
-    Add(hands, piece, 1.0);
-    left -= piece.seconds;
-  }
-  return hands;
-}
-
-DeviceScenario DeviceScenarioFromText(const std::string& text, const std::string& origin)
-{
-  const nlohmann::json json = ParseBoundedJson(text, origin);
-  JsonFields fields(json, origin);
-  fields.RequireFormat("dynamiccoronary device scenario", "scenario of a device");
-  fields.Text("description", "");
-  DeviceScenario scenario;
   EmulatedDeviceSettings& device = scenario.device;
   device.serial = fields.Text("serial", device.serial);
   device.rate = static_cast<std::uint16_t>(fields.Whole("rate_hz", 1, 1000, device.rate));
   device.firstCount =
     static_cast<std::int32_t>(fields.Whole("first_count", -Most32, Most32, device.firstCount));
   scenario.repeat = fields.Flag("repeat", false);
-  scenario.pieces = EntriesOf<HandPiece>(fields, "pieces", "piece", PieceOf);
-  scenario.faults = EntriesOf<DeviceFault>(fields, "faults", "fault", FaultOf);
-  fields.Done();
-  std::stable_sort(scenario.faults.begin(), scenario.faults.end(),
+  if (!fields.Has("faults"))
+  {
+    return;
+  }
+  std::vector<DeviceFault>& faults = scenario.faults;
+  for (const nlohmann::json& entry : fields.List("faults"))
+  {
+    if (faults.size() == MostFaults)
+    {
+      fields.Refuse("has more than " + std::to_string(MostFaults) + " 'faults'");
+    }
+    faults.push_back(FaultOf(entry, origin + ", fault " + std::to_string(faults.size() + 1)));
+  }
+  std::stable_sort(faults.begin(), faults.end(),
     [](const DeviceFault& a, const DeviceFault& b) { return a.at < b.at; });
+}
+}
+
+HandPlaces DeviceScenario::At(double seconds) const
+{
+  double left = std::max(0.0, seconds);
+  AxisPlaces places = PlacesOf({});
+  if (this->repeat && this->hands.Duration() > 0.0)
+  {
+    const double rounds = std::floor(left / this->hands.Duration());
+    left -= rounds * this->hands.Duration();
+    const AxisPlaces round = this->hands.Moved();
+    for (std::size_t axis = 0; axis < HandAxes; ++axis)
+    {
+      places[axis] += rounds * round[axis];
+    }
+  }
+  SessionInput start;
+  SetPlaces(start, places);
+  const SessionInput now = this->hands.At(left, start);
+  places = PlacesOf(now);
+  HandPlaces held;
+  for (std::size_t axis = 0; axis < HandAxes; ++axis)
+  {
+    held.places[static_cast<std::size_t>(HandAxisTable[axis].kind)] = places[axis];
+  }
+  held.pedals = static_cast<std::uint16_t>(now.pedals);
+  return held;
+}
+
+DeviceScenario DeviceScenarioFromText(const std::string& text, const std::string& origin)
+{
+  constexpr const char* oldFormat = "dynamiccoronary device scenario";
+  const nlohmann::json json = ParseBoundedJson(text, origin);
+  JsonFields fields(json, origin);
+  DeviceScenario scenario;
+  fields.Text("description", "");
+  if (fields.Text("format") == oldFormat)
+  {
+    fields.RequireFormat(oldFormat, "script");
+    ReadDevice(fields, origin, scenario);
+    if (fields.Has("pieces"))
+    {
+      scenario.hands = DriveScriptOf(fields, PiecesOf::OldDevice);
+    }
+  }
+  else
+  {
+    fields.RequireFormat("dynamiccoronary script", "script of driving");
+    scenario.hands = DriveScriptOf(fields);
+    if (fields.Has("device"))
+    {
+      JsonFields device(fields.Object("device"), origin + ", device");
+      ReadDevice(device, origin, scenario);
+      device.Done();
+    }
+  }
+  fields.Done();
   return scenario;
 }
 
 DeviceScenario ReadDeviceScenario(const std::string& path)
 {
-  return DeviceScenarioFromText(ReadTextFile(path, "a scenario of a device"), "'" + path + "'");
+  return DeviceScenarioFromText(ReadTextFile(path, "a script"), "'" + path + "'");
 }
 }

@@ -5,6 +5,7 @@
 #ifndef DynamicCoronary_DeviceScenario_h
 #define DynamicCoronary_DeviceScenario_h
 
+#include "DriveScript.h"
 #include "EmulatedDevice.h"
 
 #include <cstdint>
@@ -13,14 +14,6 @@
 
 namespace coronary
 {
-/// Even motion for some seconds; changes are against the end of the piece before.
-struct HandPiece
-{
-  double seconds = 0.0;                                                           ///< 0: at once
-  std::array<double, static_cast<std::size_t>(AxisKind::Inflation) + 1> change{}; ///< by AxisKind
-  std::uint16_t pedals = 0; ///< held during it
-};
-
 enum class FaultKind
 {
   DropBytes,    ///< the next `count` bytes
@@ -47,8 +40,8 @@ struct DeviceFault
 struct DeviceScenario
 {
   EmulatedDeviceSettings device;
-  std::vector<HandPiece> pieces;
-  bool repeat = false;             ///< the pieces begin anew, from where the hands are then
+  DriveScript hands;
+  bool repeat = false;             ///< the script begins anew, from where the hands are then
   std::vector<DeviceFault> faults; ///< by time
 
   /// `seconds` after the first START.

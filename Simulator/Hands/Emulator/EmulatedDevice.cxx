@@ -180,9 +180,7 @@ void EmulatedDevice::Begin(const Message& message, std::uint64_t now)
   }
   if (this->At == State::Greeted)
   {
-    this->Started = now;
     this->NextState = now;
-    this->StreamTime = 0;
   }
   this->At = State::Streaming;
   this->Watchdog = 1000U * std::uint64_t{ start.watchdog };
@@ -258,7 +256,6 @@ void EmulatedDevice::Step(std::uint64_t now)
   {
     return;
   }
-  this->StreamTime = now - this->Started;
   if (now >= this->NextState)
   {
     this->SendState(now);

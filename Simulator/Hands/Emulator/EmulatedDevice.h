@@ -74,7 +74,6 @@ public:
   /// On the motors: wire, catheter in N; wire, catheter in N m.
   const std::array<double, 4>& Motors() const { return this->Output; }
   const DecoderCounts& Counts() const { return this->Decoder.Counts(); }
-  std::uint64_t Streamed() const { return this->StreamTime; } ///< microseconds since START
 
   /// Called with everything that was understood.
   std::function<void(const Message& message, std::uint64_t now)> OnMessage;
@@ -100,8 +99,6 @@ private:
   HandPlaces Places;
   std::uint32_t Jump = 0;
   std::array<std::uint32_t, MostAxes> Zeros{};
-  std::uint64_t Started = 0;
-  std::uint64_t StreamTime = 0;
   std::uint64_t NextState = 0;
 
   std::uint32_t LastTick = 0;

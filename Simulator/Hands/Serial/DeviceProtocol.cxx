@@ -13,32 +13,62 @@ namespace
 constexpr std::size_t NameSize = 16;
 constexpr std::size_t ErrorTextSize = 200;
 
+template <typename Content>
+constexpr MessageType TypeOf = MessageType::Stop;
+template <>
+constexpr MessageType TypeOf<HelloMessage> = MessageType::Hello;
+template <>
+constexpr MessageType TypeOf<HelloAckMessage> = MessageType::HelloAck;
+template <>
+constexpr MessageType TypeOf<CapsMessage> = MessageType::Caps;
+template <>
+constexpr MessageType TypeOf<StartMessage> = MessageType::Start;
+template <>
+constexpr MessageType TypeOf<StateMessage> = MessageType::State;
+template <>
+constexpr MessageType TypeOf<ForceMessage> = MessageType::Force;
+template <>
+constexpr MessageType TypeOf<HeartbeatMessage> = MessageType::Heartbeat;
+template <>
+constexpr MessageType TypeOf<PingMessage> = MessageType::Ping;
+template <>
+constexpr MessageType TypeOf<PongMessage> = MessageType::Pong;
+template <>
+constexpr MessageType TypeOf<CalibMessage> = MessageType::Calib;
+
+/// The same calls as PayloadReader's, so that a payload is described once for both directions.
 class PayloadWriter
 {
 public:
   explicit PayloadWriter(MessageType type) { this->Made.type = type; }
 
-  void Whole(std::uint64_t value, int bytes)
+  template <typename T>
+  void Value(const T& value)
   {
-    for (int n = 0; n < bytes; ++n)
-    {
-      this->Made.payload[this->Made.size++] = static_cast<std::uint8_t>(value >> (8 * n));
-    }
+    this->Whole(static_cast<std::uint64_t>(value), sizeof(T));
   }
 
-  void Real(double value)
+  void Value(double value)
   {
     std::uint64_t bits = 0;
     std::memcpy(&bits, &value, sizeof(bits));
     this->Whole(bits, 8);
   }
 
-  void Real(float value)
+  void Value(float value)
   {
     std::uint32_t bits = 0;
     std::memcpy(&bits, &value, sizeof(bits));
     this->Whole(bits, 4);
   }
+
+  template <typename Enum>
+  void Known(Enum value, Enum /*last*/)
+  {
+    this->Value(value);
+  }
+
+  void Skip(int bytes) { this->Whole(0, bytes); }
 
   void Magic()
   {
@@ -57,9 +87,19 @@ public:
     }
   }
 
+  void Require(bool /*condition*/) {}
+  bool Good() const { return true; }
   const Message& Done() const { return this->Made; }
 
 private:
+  void Whole(std::uint64_t value, int bytes)
+  {
+    for (int n = 0; n < bytes; ++n)
+    {
+      this->Made.payload[this->Made.size++] = static_cast<std::uint8_t>(value >> (8 * n));
+    }
+  }
+
   Message Made;
 };
 
@@ -73,37 +113,32 @@ public:
   {
   }
 
-  std::uint64_t Whole(int bytes)
-  {
-    std::uint64_t value = 0;
-    for (int n = 0; n < bytes; ++n)
-    {
-      this->Fits = this->Fits && this->At < this->From.size;
-      const std::uint8_t byte = this->Fits ? this->From.payload[this->At] : 0;
-      ++this->At;
-      value |= static_cast<std::uint64_t>(byte) << (8 * n);
-    }
-    return value;
-  }
-
   template <typename T>
-  void Take(T& value)
+  void Value(T& value)
   {
     value = static_cast<T>(this->Whole(sizeof(T)));
   }
 
-  void Take(double& value)
+  void Value(double& value)
   {
     const std::uint64_t bits = this->Whole(8);
     std::memcpy(&value, &bits, sizeof(value));
     this->Fits = this->Fits && std::isfinite(value);
   }
 
-  void Take(float& value)
+  void Value(float& value)
   {
     const auto bits = static_cast<std::uint32_t>(this->Whole(4));
     std::memcpy(&value, &bits, sizeof(value));
     this->Fits = this->Fits && std::isfinite(value);
+  }
+
+  /// What a later version has is there, and means nothing.
+  template <typename Enum>
+  void Known(Enum& value, Enum last)
+  {
+    const std::uint64_t code = this->Whole(sizeof(Enum));
+    value = code <= static_cast<std::uint64_t>(last) ? static_cast<Enum>(code) : Enum{};
   }
 
   void Skip(int bytes) { this->Whole(bytes); }
@@ -117,9 +152,9 @@ public:
   }
 
   /// Up to its first 0; what is not printable ASCII becomes '?': it is shown to people.
-  std::string Text(std::size_t room)
+  void Text(std::string& text, std::size_t room)
   {
-    std::string text;
+    text.clear();
     bool over = false;
     for (std::size_t n = 0; n < room; ++n)
     {
@@ -130,7 +165,6 @@ public:
         text.push_back(letter >= ' ' && letter <= '~' ? letter : '?');
       }
     }
-    return text;
   }
 
   std::size_t Left() const { return this->From.size - std::min(this->From.size, this->At); }
@@ -139,6 +173,19 @@ public:
   bool Good() const { return this->Fits; }
 
 private:
+  std::uint64_t Whole(int bytes)
+  {
+    std::uint64_t value = 0;
+    for (int n = 0; n < bytes; ++n)
+    {
+      this->Fits = this->Fits && this->At < this->From.size;
+      const std::uint8_t byte = this->Fits ? this->From.payload[this->At] : 0;
+      ++this->At;
+      value |= static_cast<std::uint64_t>(byte) << (8 * n);
+    }
+    return value;
+  }
+
   const Message& From;
   std::size_t At = 0;
   bool Fits;
@@ -167,10 +214,134 @@ bool IsKnown(MessageType type)
   return type >= MessageType::Hello && type <= MessageType::Calib;
 }
 
-template <typename Enum>
-Enum Limited(std::uint64_t value, Enum last)
+template <typename Payload>
+void Fields(Payload& payload, HelloMessage& hello)
 {
-  return value <= static_cast<std::uint64_t>(last) ? static_cast<Enum>(value) : Enum{};
+  payload.Magic();
+  payload.Value(hello.minMajor);
+  payload.Value(hello.maxMajor);
+  payload.Skip(2);
+  payload.Value(hello.nonce);
+  payload.Text(hello.host, NameSize);
+}
+
+template <typename Payload>
+void Fields(Payload& payload, HelloAckMessage& ack)
+{
+  payload.Magic();
+  payload.Value(ack.major);
+  payload.Value(ack.minor);
+  payload.Skip(2);
+  payload.Value(ack.nonce);
+  payload.Text(ack.serial, NameSize);
+  payload.Text(ack.firmware, NameSize);
+}
+
+template <typename Payload>
+void Fields(Payload& payload, CapsMessage& caps)
+{
+  payload.Value(caps.index);
+  payload.Value(caps.count);
+  payload.Known(caps.kind, AxisKind::Inflation);
+  payload.Known(caps.unit, AxisUnit::Atmosphere);
+  payload.Value(caps.stateRate);
+  payload.Skip(2);
+  payload.Value(caps.perCount);
+  payload.Value(caps.low);
+  payload.Value(caps.high);
+  payload.Value(caps.resolution);
+  payload.Value(caps.maxForce);
+  payload.Require(caps.count >= 1 && caps.count <= MostAxes && caps.index < caps.count);
+  payload.Require(caps.stateRate >= 1 && caps.perCount != 0.0 && caps.maxForce >= 0.0F);
+}
+
+template <typename Payload>
+void Fields(Payload& payload, StartMessage& start)
+{
+  payload.Value(start.rate);
+  payload.Value(start.watchdog);
+  payload.Value(start.nonce);
+  payload.Require(start.rate >= 1 && start.watchdog >= 1);
+}
+
+template <typename Payload>
+void Fields(Payload& payload, StateMessage& state)
+{
+  payload.Value(state.tick);
+  payload.Value(state.pedals);
+  payload.Value(state.buttons);
+  payload.Value(state.status);
+  payload.Value(state.axes);
+  payload.Skip(1);
+  payload.Require(state.axes <= MostAxes);
+  for (std::size_t n = 0; n < state.axes && payload.Good(); ++n)
+  {
+    payload.Value(state.counts[n]);
+  }
+}
+
+template <typename Payload>
+void Fields(Payload& payload, ForceMessage& force)
+{
+  payload.Value(force.tick);
+  payload.Value(force.validMilliseconds);
+  payload.Skip(2);
+  for (float* value : { &force.force[0], &force.force[1], &force.torque[0], &force.torque[1] })
+  {
+    payload.Value(*value);
+  }
+}
+
+template <typename Payload>
+void Fields(Payload& payload, HeartbeatMessage& heartbeat)
+{
+  payload.Value(heartbeat.tick);
+}
+
+template <typename Payload>
+void Fields(Payload& payload, PingMessage& ping)
+{
+  payload.Value(ping.number);
+  payload.Value(ping.hostMicroseconds);
+}
+
+template <typename Payload>
+void Fields(Payload& payload, PongMessage& pong)
+{
+  payload.Value(pong.number);
+  payload.Value(pong.hostMicroseconds);
+  payload.Value(pong.deviceMicroseconds);
+}
+
+template <typename Payload>
+void Fields(Payload& payload, ZeroMessage& zero)
+{
+  payload.Value(zero.axes);
+}
+
+template <typename Payload>
+void Fields(Payload& payload, CalibMessage& calib)
+{
+  payload.Value(calib.axis);
+  payload.Skip(3);
+  payload.Value(calib.perCount);
+  payload.Require(calib.axis < MostAxes && calib.perCount != 0.0);
+}
+
+template <typename Content>
+Message Encoded(MessageType type, Content content)
+{
+  PayloadWriter to(type);
+  Fields(to, content);
+  return to.Done();
+}
+
+template <typename Content>
+bool Decoded(const Message& message, MessageType type, Content& content)
+{
+  PayloadReader from(message, type);
+  Fields(from, content);
+  return from.Good();
 }
 }
 
@@ -275,110 +446,43 @@ bool FrameDecoder::InSequence()
   return true;
 }
 
-Message Encode(const HelloMessage& hello)
+template <typename Content>
+Message Encode(const Content& content)
 {
-  PayloadWriter to(MessageType::Hello);
-  to.Magic();
-  to.Whole(hello.minMajor, 1);
-  to.Whole(hello.maxMajor, 1);
-  to.Whole(0, 2);
-  to.Whole(hello.nonce, 4);
-  to.Text(hello.host, NameSize);
-  return to.Done();
+  return Encoded(TypeOf<Content>, content);
 }
 
-bool Decode(const Message& message, HelloMessage& hello)
+template <typename Content>
+bool Decode(const Message& message, Content& content)
 {
-  PayloadReader from(message, MessageType::Hello);
-  from.Magic();
-  from.Take(hello.minMajor);
-  from.Take(hello.maxMajor);
-  from.Skip(2);
-  from.Take(hello.nonce);
-  hello.host = from.Text(NameSize);
-  return from.Good();
+  return Decoded(message, TypeOf<Content>, content);
 }
 
-Message Encode(const HelloAckMessage& ack)
-{
-  PayloadWriter to(MessageType::HelloAck);
-  to.Magic();
-  to.Whole(ack.major, 1);
-  to.Whole(ack.minor, 1);
-  to.Whole(0, 2);
-  to.Whole(ack.nonce, 4);
-  to.Text(ack.serial, NameSize);
-  to.Text(ack.firmware, NameSize);
-  return to.Done();
-}
+template Message Encode(const HelloMessage&);
+template bool Decode(const Message&, HelloMessage&);
+template Message Encode(const HelloAckMessage&);
+template bool Decode(const Message&, HelloAckMessage&);
+template Message Encode(const CapsMessage&);
+template bool Decode(const Message&, CapsMessage&);
+template Message Encode(const StartMessage&);
+template bool Decode(const Message&, StartMessage&);
+template bool Decode(const Message&, StateMessage&);
+template Message Encode(const ForceMessage&);
+template bool Decode(const Message&, ForceMessage&);
+template Message Encode(const HeartbeatMessage&);
+template bool Decode(const Message&, HeartbeatMessage&);
+template Message Encode(const PingMessage&);
+template bool Decode(const Message&, PingMessage&);
+template Message Encode(const PongMessage&);
+template bool Decode(const Message&, PongMessage&);
+template Message Encode(const CalibMessage&);
+template bool Decode(const Message&, CalibMessage&);
 
-bool Decode(const Message& message, HelloAckMessage& ack)
+Message Encode(const StateMessage& given)
 {
-  PayloadReader from(message, MessageType::HelloAck);
-  from.Magic();
-  from.Take(ack.major);
-  from.Take(ack.minor);
-  from.Skip(2);
-  from.Take(ack.nonce);
-  ack.serial = from.Text(NameSize);
-  ack.firmware = from.Text(NameSize);
-  return from.Good();
-}
-
-Message Encode(const CapsMessage& caps)
-{
-  PayloadWriter to(MessageType::Caps);
-  to.Whole(caps.index, 1);
-  to.Whole(caps.count, 1);
-  to.Whole(static_cast<std::uint8_t>(caps.kind), 1);
-  to.Whole(static_cast<std::uint8_t>(caps.unit), 1);
-  to.Whole(caps.stateRate, 2);
-  to.Whole(0, 2);
-  to.Real(caps.perCount);
-  to.Real(caps.low);
-  to.Real(caps.high);
-  to.Real(caps.resolution);
-  to.Real(caps.maxForce);
-  return to.Done();
-}
-
-bool Decode(const Message& message, CapsMessage& caps)
-{
-  PayloadReader from(message, MessageType::Caps);
-  from.Take(caps.index);
-  from.Take(caps.count);
-  // An axis of a later version is there, and moves nothing.
-  caps.kind = Limited(from.Whole(1), AxisKind::Inflation);
-  caps.unit = Limited(from.Whole(1), AxisUnit::Atmosphere);
-  from.Take(caps.stateRate);
-  from.Skip(2);
-  from.Take(caps.perCount);
-  from.Take(caps.low);
-  from.Take(caps.high);
-  from.Take(caps.resolution);
-  from.Take(caps.maxForce);
-  from.Require(caps.count >= 1 && caps.count <= MostAxes && caps.index < caps.count);
-  from.Require(caps.stateRate >= 1 && caps.perCount != 0.0 && caps.maxForce >= 0.0F);
-  return from.Good();
-}
-
-Message Encode(const StartMessage& start)
-{
-  PayloadWriter to(MessageType::Start);
-  to.Whole(start.rate, 2);
-  to.Whole(start.watchdog, 2);
-  to.Whole(start.nonce, 4);
-  return to.Done();
-}
-
-bool Decode(const Message& message, StartMessage& start)
-{
-  PayloadReader from(message, MessageType::Start);
-  from.Take(start.rate);
-  from.Take(start.watchdog);
-  from.Take(start.nonce);
-  from.Require(start.rate >= 1 && start.watchdog >= 1);
-  return from.Good();
+  StateMessage state = given;
+  state.axes = static_cast<std::uint8_t>(std::min<std::size_t>(state.axes, MostAxes));
+  return Encoded(MessageType::State, state);
 }
 
 Message EncodeStop()
@@ -386,118 +490,10 @@ Message EncodeStop()
   return PayloadWriter(MessageType::Stop).Done();
 }
 
-Message Encode(const StateMessage& state)
-{
-  PayloadWriter to(MessageType::State);
-  to.Whole(state.tick, 4);
-  to.Whole(state.pedals, 2);
-  to.Whole(state.buttons, 2);
-  to.Whole(state.status, 2);
-  const std::size_t axes = std::min<std::size_t>(state.axes, MostAxes);
-  to.Whole(axes, 1);
-  to.Whole(0, 1);
-  for (std::size_t n = 0; n < axes; ++n)
-  {
-    to.Whole(static_cast<std::uint32_t>(state.counts[n]), 4);
-  }
-  return to.Done();
-}
-
-bool Decode(const Message& message, StateMessage& state)
-{
-  PayloadReader from(message, MessageType::State);
-  from.Take(state.tick);
-  from.Take(state.pedals);
-  from.Take(state.buttons);
-  from.Take(state.status);
-  from.Take(state.axes);
-  from.Skip(1);
-  from.Require(state.axes <= MostAxes);
-  for (std::size_t n = 0; n < state.axes && from.Good(); ++n)
-  {
-    from.Take(state.counts[n]);
-  }
-  return from.Good();
-}
-
-Message Encode(const ForceMessage& force)
-{
-  PayloadWriter to(MessageType::Force);
-  to.Whole(force.tick, 4);
-  to.Whole(force.validMilliseconds, 2);
-  to.Whole(0, 2);
-  for (const float value : { force.force[0], force.force[1], force.torque[0], force.torque[1] })
-  {
-    to.Real(value);
-  }
-  return to.Done();
-}
-
-bool Decode(const Message& message, ForceMessage& force)
-{
-  PayloadReader from(message, MessageType::Force);
-  from.Take(force.tick);
-  from.Take(force.validMilliseconds);
-  from.Skip(2);
-  from.Take(force.force[0]);
-  from.Take(force.force[1]);
-  from.Take(force.torque[0]);
-  from.Take(force.torque[1]);
-  return from.Good();
-}
-
-Message Encode(const HeartbeatMessage& heartbeat)
-{
-  PayloadWriter to(MessageType::Heartbeat);
-  to.Whole(heartbeat.tick, 4);
-  return to.Done();
-}
-
-bool Decode(const Message& message, HeartbeatMessage& heartbeat)
-{
-  PayloadReader from(message, MessageType::Heartbeat);
-  from.Take(heartbeat.tick);
-  return from.Good();
-}
-
-Message Encode(const PingMessage& ping)
-{
-  PayloadWriter to(MessageType::Ping);
-  to.Whole(ping.number, 4);
-  to.Whole(ping.hostMicroseconds, 8);
-  return to.Done();
-}
-
-bool Decode(const Message& message, PingMessage& ping)
-{
-  PayloadReader from(message, MessageType::Ping);
-  from.Take(ping.number);
-  from.Take(ping.hostMicroseconds);
-  return from.Good();
-}
-
-Message Encode(const PongMessage& pong)
-{
-  PayloadWriter to(MessageType::Pong);
-  to.Whole(pong.number, 4);
-  to.Whole(pong.hostMicroseconds, 8);
-  to.Whole(pong.deviceMicroseconds, 8);
-  return to.Done();
-}
-
-bool Decode(const Message& message, PongMessage& pong)
-{
-  PayloadReader from(message, MessageType::Pong);
-  from.Take(pong.number);
-  from.Take(pong.hostMicroseconds);
-  from.Take(pong.deviceMicroseconds);
-  return from.Good();
-}
-
 Message Encode(const ErrorMessage& error)
 {
   PayloadWriter to(MessageType::Error);
-  to.Whole(static_cast<std::uint16_t>(error.code), 2);
+  to.Value(error.code);
   to.Text(error.text, std::min(error.text.size(), ErrorTextSize));
   return to.Done();
 }
@@ -505,43 +501,20 @@ Message Encode(const ErrorMessage& error)
 bool Decode(const Message& message, ErrorMessage& error)
 {
   PayloadReader from(message, MessageType::Error);
-  const std::uint64_t code = from.Whole(2);
-  error.code = code == 0 || code > 4 ? DeviceError::Other : static_cast<DeviceError>(code);
-  error.text = from.Text(std::min(from.Left(), ErrorTextSize));
+  from.Known(error.code, DeviceError::Other);
+  error.code = error.code == DeviceError{} ? DeviceError::Other : error.code;
+  from.Text(error.text, std::min(from.Left(), ErrorTextSize));
   return from.Good();
 }
 
 Message Encode(MessageType zeroOrAck, const ZeroMessage& zero)
 {
-  PayloadWriter to(zeroOrAck);
-  to.Whole(zero.axes, 4);
-  return to.Done();
+  return Encoded(zeroOrAck, zero);
 }
 
 bool Decode(const Message& message, ZeroMessage& zero)
 {
   const bool ack = message.type == MessageType::ZeroAck;
-  PayloadReader from(message, ack ? MessageType::ZeroAck : MessageType::Zero);
-  from.Take(zero.axes);
-  return from.Good();
-}
-
-Message Encode(const CalibMessage& calib)
-{
-  PayloadWriter to(MessageType::Calib);
-  to.Whole(calib.axis, 1);
-  to.Whole(0, 3);
-  to.Real(calib.perCount);
-  return to.Done();
-}
-
-bool Decode(const Message& message, CalibMessage& calib)
-{
-  PayloadReader from(message, MessageType::Calib);
-  from.Take(calib.axis);
-  from.Skip(3);
-  from.Take(calib.perCount);
-  from.Require(calib.axis < MostAxes && calib.perCount != 0.0);
-  return from.Good();
+  return Decoded(message, ack ? MessageType::ZeroAck : MessageType::Zero, zero);
 }
 }

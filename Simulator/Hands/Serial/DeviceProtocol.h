@@ -275,36 +275,21 @@ struct CalibMessage
 
 ///@{
 /// The message's type and payload; the rest is for the sender. Texts are cut to what there is room for.
-Message Encode(const HelloMessage& hello);
-Message Encode(const HelloAckMessage& ack);
-Message Encode(const CapsMessage& caps);
-Message Encode(const StartMessage& start);
-Message EncodeStop();
+template <typename Content>
+Message Encode(const Content& content); ///< one of the structures above
 Message Encode(const StateMessage& state);
-Message Encode(const ForceMessage& force);
-Message Encode(const HeartbeatMessage& heartbeat);
-Message Encode(const PingMessage& ping);
-Message Encode(const PongMessage& pong);
 Message Encode(const ErrorMessage& error);
 Message Encode(MessageType zeroOrAck, const ZeroMessage& zero);
-Message Encode(const CalibMessage& calib);
+Message EncodeStop();
 ///@}
 
 ///@{
 /// @return false for another type, a payload that is too short, another magic, numbers that are out of their range or
 /// not finite. Bytes behind the payload that is known are for later versions, and ignored.
-bool Decode(const Message& message, HelloMessage& hello);
-bool Decode(const Message& message, HelloAckMessage& ack);
-bool Decode(const Message& message, CapsMessage& caps);
-bool Decode(const Message& message, StartMessage& start);
-bool Decode(const Message& message, StateMessage& state);
-bool Decode(const Message& message, ForceMessage& force);
-bool Decode(const Message& message, HeartbeatMessage& heartbeat);
-bool Decode(const Message& message, PingMessage& ping);
-bool Decode(const Message& message, PongMessage& pong);
+template <typename Content>
+bool Decode(const Message& message, Content& content); ///< one of the structures above
 bool Decode(const Message& message, ErrorMessage& error);
 bool Decode(const Message& message, ZeroMessage& zero);
-bool Decode(const Message& message, CalibMessage& calib);
 ///@}
 
 /// Numbers the frames of one direction.
