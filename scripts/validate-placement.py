@@ -39,7 +39,9 @@ CONDITIONS = {
 FIRST_SEED = {"fit": 801, "judge": 901}
 PHANTOM = ["--spacing", "0.6", "--fractions", "0.05,0.25,0.45,0.6,0.8"]
 RUN = ["--partial", "--motion", "tracked", "--edges", "0.5", "1.5"]
+KEPT = ["report.json", "motion/centerline*"]
 BINS = 10
+GROSS = 2.0  # mm: beyond what motion does to an image, what is there is no artery, or another place
 LARGEST_ERROR = 0.05  # expected calibration error: asked
 
 
@@ -66,10 +68,10 @@ def rows_of(options, build, kind):
                     shutil.rmtree(series)
                     return {"failure": str(failure)}
                 for name in os.listdir(series):
-                    if name != "truth":
+                    if name != "truth" and not options.keep_images:
                         path = os.path.join(series, name)
                         (shutil.rmtree if os.path.isdir(path) else os.remove)(path)
-                kept_results.keep_only(run, ["report.json", "motion/centerline*"])
+                kept_results.keep_only(run, KEPT)
                 return {}
 
             folder = os.path.join(options.output, "placement", kind, seed)
@@ -95,7 +97,8 @@ def read(tables):
     rows = []
     for table in tables:
         with open(table, newline="", encoding="utf-8") as file:
-            rows += [(row["condition"], row["seed"], float(row["probability"]), row["placed"] == "1") for row in csv.DictReader(file)]
+            rows += [(row["condition"], row["seed"], float(row["probability"]), row["placed"] == "1", float(row["distance"]))
+                     for row in csv.DictReader(file)]
     return rows
 
 
@@ -125,10 +128,13 @@ def judge_rows(rows):
     error = calibration_error(rows)
     wrong = [row for row in rows if not row[3]]
     sure = [row for row in wrong if row[2] > 0.5]
+    gross = [row for row in wrong if row[4] > GROSS]
     print("\n%d branches and phases of %d hearts; placed %.3f. Expected calibration error %.3f (by chance alone %.3f; asked %.2f: %s), "
-          "Brier score %.3f (always saying the mean: %.3f). Not placed: %d, of which %d were said with more than 0.5.\n"
+          "Brier score %.3f (always saying the mean: %.3f). Not placed: %d, of which %d were said with more than 0.5; farther than %g mm: "
+          "%d, of which %d.\n"
           % (len(rows), len({row[:2] for row in rows}), share, error, by_chance(rows), LARGEST_ERROR,
-             "met" if error <= LARGEST_ERROR else "**missed**", brier, share * (1.0 - share), len(wrong), len(sure)))
+             "met" if error <= LARGEST_ERROR else "**missed**", brier, share * (1.0 - share), len(wrong), len(sure), GROSS, len(gross),
+             sum(row in gross for row in sure)))
     print("| condition | rows | said, mean | placed | not placed, said above 0.5 |\n|---|---|---|---|---|")
     for condition in dict.fromkeys(row[0] for row in rows):
         own = [row for row in rows if row[0] == condition]
@@ -144,6 +150,7 @@ def main():
     parser.add_argument("--output", default=os.path.join(ROOT, "validation-output"), help="where runs and rows are kept")
     parser.add_argument("--hearts", type=int, default=2, help="of each condition")
     parser.add_argument("--keep-runs", action="store_true", help="runs serve the next program, too: for work on the weights")
+    parser.add_argument("--keep-images", action="store_true", help="images stay, too (150 MB a heart): for work on signs")
     parser.add_argument("--fit", action="store_true", help="the weights from the hearts for that, nothing judged")
     parser.add_argument("--tables", nargs="+", metavar="FILE", help="judge these instead")
     options = parser.parse_args()

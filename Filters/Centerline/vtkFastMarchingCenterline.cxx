@@ -83,6 +83,22 @@ std::vector<Vector3> PointsOf(
   return points;
 }
 
+/// `Confidence` of the points of an input, if there is one, and 1 of others.
+std::vector<double> ConfidencesOf(vtkInformationVector* input, std::size_t count)
+{
+  vtkPointSet* set = input->GetNumberOfInformationObjects() > 0
+    ? vtkPointSet::GetData(input->GetInformationObject(0))
+    : nullptr;
+  vtkDataArray* array =
+    set ? set->GetPointData()->GetArray(vtkCoronaryArrayNames::Confidence) : nullptr;
+  std::vector<double> confidences(count, 1.0);
+  for (vtkIdType n = 0; array && n < array->GetNumberOfTuples(); ++n)
+  {
+    confidences[static_cast<std::size_t>(n)] = array->GetComponent(n, 0);
+  }
+  return confidences;
+}
+
 vtkImageData* ImageOf(vtkInformationVector* input)
 {
   return input->GetNumberOfInformationObjects() > 0
@@ -128,7 +144,9 @@ coronary::SurfaceDistance DistanceTo(
 namespace names = vtkCoronaryArrayNames;
 using Branch = VesselTree::Branch;
 
-void FillTree(vtkPolyData* output, const coronary::CenterlineResult& result)
+/// @param ostia  confidence of each seed
+void FillTree(
+  vtkPolyData* output, const coronary::CenterlineResult& result, const std::vector<double>& ostia)
 {
   const VesselTree& tree = result.tree;
   vtkCoronary::SetTree(output, tree);
@@ -136,6 +154,15 @@ void FillTree(vtkPolyData* output, const coronary::CenterlineResult& result)
   vtkCoronary::AddArray<vtkUnsignedCharArray>(output->GetPointData(), names::Bridged, tree.bridged);
   vtkCoronary::AddArray<vtkDoubleArray>(
     output->GetPointData(), names::BridgeConfidence, tree.bridgeConfidence);
+  std::vector<double> ostium(tree.points.size(), 1.0);
+  for (const Branch& branch : tree.branches)
+  {
+    for (const std::int64_t point : branch.points)
+    {
+      ostium[static_cast<std::size_t>(point)] = ostia[static_cast<std::size_t>(branch.treeId)];
+    }
+  }
+  vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::OstiumConfidence, ostium);
   vtkNew<vtkDoubleArray> veinPositions;
   veinPositions->SetName(names::VeinPositions);
   veinPositions->SetNumberOfComponents(3);
@@ -577,7 +604,8 @@ void vtkFastMarchingCenterline::Execute(
     }
   }
 
-  FillTree(vtkPolyData::GetData(outputs, TreePort), result);
+  FillTree(vtkPolyData::GetData(outputs, TreePort), result,
+    ConfidencesOf(inputs[1], source.input.seeds.size()));
   FillLines(
     vtkPolyData::GetData(outputs, LinesPort), result.tree, LineEnds(result, settings.findTips));
   FillBifurcations(vtkPolyData::GetData(outputs, BifurcationsPort), result);

@@ -168,6 +168,15 @@ vtkSmartPointer<vtkPolyData> PointsOf(vtkPolyData* given, const coronary::Edited
   replace(names::Confidence, edited.tree.confidence);
   replace(names::Bridged, edited.tree.bridged);
   replace(names::BridgeConfidence, edited.tree.bridgeConfidence);
+  // What was drawn by hand hangs on no ostium that was guessed.
+  vtkDataArray* ostium = to->GetArray(names::OstiumConfidence);
+  for (std::size_t p = 0; ostium && p < edited.source.size(); ++p)
+  {
+    if (edited.source[p] < 0)
+    {
+      ostium->SetTuple1(static_cast<vtkIdType>(p), 1.0);
+    }
+  }
   vtkCoronary::AddArray<vtkIntArray>(to, names::EditNumber, edited.edit);
   vtkFieldData* fields = points->GetFieldData();
   fields->PassData(given->GetFieldData());

@@ -44,6 +44,8 @@ constexpr const char* VeinProbabilities = "VeinProbabilities"; ///< double, 0.5 
 constexpr const char* Bridged = "Bridged"; ///< unsigned char, 1: not seen, guessed across a lesion
 constexpr const char* BridgeConfidence =
   "BridgeConfidence"; ///< double, 0 to 1, 1 before any bridge
+constexpr const char* OstiumConfidence =
+  "OstiumConfidence"; ///< double, 0 to 1, of the seed that the point hangs on
 constexpr const char* Radius = "MaximumInscribedSphereRadius"; ///< double, mm
 constexpr const char* Abscissas = "Abscissas";       ///< double, mm from the root along the tree
 constexpr const char* SegmentIds = "SegmentIds";     ///< int, coronary::SegmentId
@@ -239,6 +241,9 @@ constexpr const char* TrackingConfidence = "TrackingConfidence"; ///< double, 0 
 constexpr const char* TrackingStatus = "TrackingStatus";         ///< int, coronary::TrackingStatus
 /// double, 0 to 1: probability that the branch is within 1 mm of an artery at this phase (coronary::PlacementConfidence)
 constexpr const char* PlacementConfidence = "PlacementConfidence";
+constexpr const char* LumenBeside = "LumenBeside"; ///< double, mm to the middle of the lumen
+constexpr const char* LumenContrast =
+  "LumenContrast"; ///< double, HU of the point over its surroundings
 // Tracked lines, field data.
 constexpr const char* ReferenceTime = "ReferenceTime"; ///< double, fraction of the R-R interval
 constexpr const char* TrackedShare = "TrackedShare";   ///< double, 0 to 1, one value a phase

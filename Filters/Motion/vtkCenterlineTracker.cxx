@@ -2,6 +2,7 @@
 
 #include "BranchPlacement.h"
 #include "CenterlineTracking.h"
+#include "LumenSight.h"
 #include "VesselImage.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
@@ -30,6 +31,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 namespace names = vtkCoronaryArrayNames;
 using coronary::PoseSequence;
@@ -127,6 +129,7 @@ struct vtkCenterlineTracker::Internals
   double Reference = 0.0;
   double Cycle = 0.0;
   std::vector<std::vector<double>> Placement; ///< per phase and point
+  std::vector<coronary::LumenSight> Sights;   ///< per phase; of images of tissue only
 
   bool Knows(vtkCenterlineTracker* self, vtkInformationVector** inputs) const
   {
@@ -345,11 +348,20 @@ void vtkCenterlineTracker::Track(vtkInformationVector** inputs)
   Require(!images || hasReference,
     "The reference time " + std::to_string(data.Reference) +
       " is none of the time steps of the series");
+  coronary::ItemSharing& sharing =
+    this->Sharing != nullptr ? *this->Sharing : coronary::ItemSharing::None();
+  const double tracked = settings.tissue ? 0.95 : 1.0; // of the work
   data.Poses = coronary::TrackCenterlines(data.Lines, data.Reference, times, imageAt, settings,
-    &data.Report, vtkCoronary::ProgressOf(this),
-    this->Sharing != nullptr ? *this->Sharing : coronary::ItemSharing::None());
-  data.Placement = coronary::PlacementConfidences(data.Lines, vtkMovedLines::CertaintyOf(input),
-    data.Poses, { data.Reference, settings.temporalWindow / data.Cycle });
+    &data.Report, vtkCoronary::ProgressOf(this, 0.0, tracked), sharing);
+  coronary::PlacementEvidence evidence = vtkMovedLines::EvidenceOf(input);
+  if (settings.tissue)
+  {
+    evidence.sights = coronary::SeeLumens(
+      data.Lines, data.Poses, imageAt, vtkCoronary::ProgressOf(this, tracked, 1.0), sharing);
+  }
+  data.Placement = coronary::PlacementConfidences(
+    data.Lines, evidence, data.Poses, { data.Reference, settings.temporalWindow / data.Cycle });
+  data.Sights = std::move(evidence.sights);
   ++data.Trackings;
   data.Known = true;
   data.KnownOf = this->GetMTime();
@@ -396,6 +408,13 @@ int vtkCenterlineTracker::RequestData(
     write(input, vtkPoseSequences::MomentOf(data.Poses, phase), output[0]);
     vtkCoronary::AddArray<vtkDoubleArray>(
       output[0]->GetPointData(), names::PlacementConfidence, data.Placement[phase]);
+    if (!data.Sights.empty())
+    {
+      vtkCoronary::AddArray<vtkDoubleArray>(
+        output[0]->GetPointData(), names::LumenBeside, data.Sights[phase].beside);
+      vtkCoronary::AddArray<vtkDoubleArray>(
+        output[0]->GetPointData(), names::LumenContrast, data.Sights[phase].contrast);
+    }
 
     vtkInformation* skeletonInfo = Connection(inputs, SkeletonPort);
     vtkPolyData* skeleton = skeletonInfo != nullptr ? vtkPolyData::GetData(skeletonInfo) : nullptr;

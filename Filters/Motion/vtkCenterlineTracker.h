@@ -17,8 +17,8 @@
  *   with time steps: closed surfaces of the vessels at every phase (polygons or strips, turned the same way), or
  *   the lines of every phase with radii, as found in it by whatever means. Neither need the same points nor
  *   the same branches at all phases.
- * - 1: vtkPolyData, lines to track, at the reference phase. Point data `MaximumInscribedSphereRadius` or `Radius`
- *   (optional). Field data `PhaseTime` (optional): the reference phase.
+ * - 1: vtkPolyData, lines to track, at the reference phase. Point data `MaximumInscribedSphereRadius` or `Radius`,
+ *   `Confidence`, `OstiumConfidence` (all optional). Field data `PhaseTime` (optional): the reference phase.
  * - 2, optional: vtkPolyData, a skeleton made of the same lines, of which the second output is made.
  *
  * @par Output ports:
@@ -26,7 +26,8 @@
  *   `PlacementConfidence` (double, 0 to 1: probability that the branch is within 1 mm of an artery at that phase),
  *   `TrackingConfidence` (double, 0 to 1), `TrackingStatus` (int, coronary::TrackingStatus: 0 tracked, 1 weak, 2 lost,
  *   3 filled), `CalibreFactor` (double, of the radius), `Displacement` (double[3], mm, from the
- *   reference). Cell data `AxialStrain` (double: length / length at the reference - 1).
+ *   reference); of CT also `LumenBeside` (double, mm, 2 at most: where the phase's image has the middle of the lumen,
+ *   from the point), `LumenContrast` (double, HU: of the point over its surroundings). Cell data `AxialStrain` (double: length / length at the reference - 1).
  * - 1: vtkPolyData, the skeleton with the same arrays, as vtkSkinDeformation takes it.
  * Both have TIME_STEPS and TIME_RANGE of the tracked phases; another time gives the nearest one. Field data:
  * that of the lines, `CycleLength` (double, s; 0.8 where the inputs do not say it), `ReferenceTime` (double, fraction of R-R), `TrackedShare` (double, one value
@@ -37,7 +38,7 @@
  *
  * @par Time:
  * TIME_STEPS and TIME_RANGE are the tracked phases; another time gives the nearest one. The first request reads all
- * tracked phases, later ones read no image.
+ * tracked phases, CT twice, later ones read no image.
  *
  * @par Failure:
  * An input without time steps or with one only, times that do not increase, lines outside the image, a

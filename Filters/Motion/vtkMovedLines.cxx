@@ -21,6 +21,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace names = vtkCoronaryArrayNames;
 using coronary::PoseSequence;
@@ -92,11 +93,18 @@ void SetTimes(vtkInformationVector* outputs, const std::vector<double>& times)
   }
 }
 
-std::vector<double> CertaintyOf(vtkPolyData* lines)
+coronary::PlacementEvidence EvidenceOf(vtkPolyData* lines)
 {
   coronary::VesselTree values;
   vtkCoronary::AddPointValues(lines, values);
-  return values.confidence;
+  coronary::PlacementEvidence evidence;
+  evidence.certainty = std::move(values.confidence);
+  vtkDataArray* ostium = lines->GetPointData()->GetArray(names::OstiumConfidence);
+  for (vtkIdType n = 0; ostium && n < ostium->GetNumberOfTuples(); ++n)
+  {
+    evidence.ostium.push_back(ostium->GetComponent(n, 0));
+  }
+  return evidence;
 }
 
 Feet::Feet(const coronary::Polylines& lines, vtkPolyData* skeleton)

@@ -243,7 +243,7 @@ void vtkPopulationMotion::Move(vtkInformationVector** inputs, vtkInformation* ou
   {
     deviations.push_back(data.IsTracked(k) ? std::vector<double>() : data.Report.deviations[k]);
   }
-  data.Placement = coronary::PlacementConfidences(data.Lines, vtkMovedLines::CertaintyOf(input),
+  data.Placement = coronary::PlacementConfidences(data.Lines, vtkMovedLines::EvidenceOf(input),
     data.Poses, { data.Reference, this->TemporalWindow / data.Cycle }, deviations);
   ++data.Motions;
   data.Known = true;

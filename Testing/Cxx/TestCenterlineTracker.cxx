@@ -220,8 +220,8 @@ TEST(CenterlineTracker, FollowsThePhantomAndReadsItOnce)
   ASSERT_EQ(output->GetNumberOfPoints(), input->GetNumberOfPoints());
   EXPECT_EQ(
     output->GetCellData()->GetArray("GroupIds"), input->GetCellData()->GetArray("GroupIds"));
-  for (const char* name :
-    { "PlacementConfidence", "TrackingConfidence", "TrackingStatus", "CalibreFactor" })
+  for (const char* name : { "PlacementConfidence", "TrackingConfidence", "TrackingStatus",
+         "CalibreFactor", "LumenBeside", "LumenContrast" })
   {
     vtkDataArray* array = output->GetPointData()->GetArray(name);
     ASSERT_NE(array, nullptr) << name;

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 using namespace coronary;
@@ -52,6 +53,7 @@ TEST(BranchPlacement, SignsOfWhatIsSeen)
     EXPECT_EQ(own.unseen, 0.0);
     EXPECT_EQ(own.seldom, 0.0);
     EXPECT_EQ(own.swept, 0.0);
+    EXPECT_EQ(own.doubtful, 0.0);
   }
   EXPECT_GT(PlacementConfidence(signs[0]), 0.95);
 }
@@ -75,7 +77,7 @@ TEST(BranchPlacement, SignsOfWhatIsNot)
     point[2] += 3.0;
   }
   const std::vector<PlacementSigns> signs =
-    SignsOfPlacement(lines, certainty, poses, { 0.5, 0.1 })[0];
+    SignsOfPlacement(lines, { certainty, {}, {} }, poses, { 0.5, 0.1 })[0];
   EXPECT_NEAR(signs[1].unseen, 10.0 / 21.0, 1e-12);
   EXPECT_NEAR(signs[1].unclear, 0.5 * 10.0 / 21.0, 1e-12);
   EXPECT_NEAR(signs[1].seldom, 31.0 / (31.0 + 41.0) * 10.0 / 21.0, 1e-12);
@@ -125,6 +127,77 @@ TEST(BranchPlacement, WhatIsMostlyUnseenIsNeverConfident)
   EXPECT_LE(PlacementConfidence(signs), 0.5);
 }
 
+TEST(BranchPlacement, WhatHangsOnADoubtfulOstiumIsNeverConfident)
+{
+  const Polylines lines = TwoLines();
+  PlacementEvidence evidence;
+  evidence.ostium.assign(lines.points.size(), 0.75);
+  EXPECT_GT(PlacementConfidences(lines, evidence, AtRest(lines), { 0.5, 0.1 })[0][40], 0.9);
+  evidence.ostium.assign(lines.points.size(), 0.66);
+  const std::vector<std::vector<double>> doubted =
+    PlacementConfidences(lines, evidence, AtRest(lines), { 0.5, 0.1 });
+  for (const double said : doubted[0])
+  {
+    EXPECT_LE(said, 0.5);
+  }
+}
+
+TEST(BranchPlacement, SignsOfWhatTheImagesShow)
+{
+  const Polylines lines = TwoLines();
+  const std::size_t count = lines.points.size();
+  PoseSequence poses = AtRest(lines);
+  poses.times = { 0.5, 0.7, 0.9 };
+  poses.points.resize(3, lines.points);
+  poses.status.resize(3, poses.status[0]);
+  PlacementEvidence evidence;
+  const double beside[] = { 0.1, 0.5, 0.9 };
+  const double contrast[] = { 300.0, 150.0, 270.0 };
+  const double dim[] = { 0.0, 0.3, 0.0 }; // less the usual 0.2
+  for (int k = 0; k < 3; ++k)
+  {
+    evidence.sights.push_back(
+      { std::vector<double>(count, beside[k]), std::vector<double>(count, contrast[k]) });
+  }
+  const auto signs = SignsOfPlacement(lines, evidence, poses, { 0.5, 0.1 });
+  for (int k = 0; k < 3; ++k)
+  {
+    EXPECT_NEAR(signs[k][1].beside, std::max(0.0, beside[k] - UsualBeside), 1e-12);
+    EXPECT_NEAR(signs[k][1].dim, dim[k], 1e-12);
+    EXPECT_NEAR(signs[k][1].strays, 0.7 - UsualBeside, 1e-12); // not at the reference
+  }
+}
+
+TEST(BranchPlacement, EverySignSpeaksAgainst)
+{
+  using Sign = double PlacementSigns::*;
+  for (const Sign sign : { &PlacementSigns::unclear, &PlacementSigns::seldom,
+         &PlacementSigns::swept, &PlacementSigns::doubtful, &PlacementSigns::unseen,
+         &PlacementSigns::beside, &PlacementSigns::dim, &PlacementSigns::strays })
+  {
+    double before = 1.0;
+    for (const double more : { 0.0, 0.2, 0.5, 0.8, 1.0 })
+    {
+      PlacementSigns changed;
+      changed.*sign += more;
+      const double said = PlacementConfidence(changed);
+      EXPECT_LE(said, before);
+      before = said;
+    }
+  }
+}
+
+TEST(BranchPlacement, WhatIsBesideTheLumenIsNeverConfident)
+{
+  // Farther than 1 mm, as the image of the phase has it, or those of the other phases.
+  PlacementSigns signs;
+  signs.beside = 0.71;
+  EXPECT_LE(PlacementConfidence(signs), 0.5);
+  signs.beside = 0.0;
+  signs.strays = 0.71;
+  EXPECT_LE(PlacementConfidence(signs), 0.5);
+}
+
 TEST(BranchPlacement, OneNumberForEachLine)
 {
   const Polylines lines = TwoLines();
@@ -165,7 +238,11 @@ TEST(BranchPlacement, RefusesOtherLines)
   poses = AtRest(lines);
   poses.status[0].pop_back();
   EXPECT_THROW(SignsOfPlacement(lines, {}, poses, { 0.5, 0.1 }), std::invalid_argument);
-  EXPECT_THROW(
-    SignsOfPlacement(lines, { 1.0 }, AtRest(lines), { 0.5, 0.1 }), std::invalid_argument);
+  EXPECT_THROW(SignsOfPlacement(lines, { { 1.0 }, {}, {} }, AtRest(lines), { 0.5, 0.1 }),
+    std::invalid_argument);
+  EXPECT_THROW(SignsOfPlacement(lines, { {}, { 1.0 }, {} }, AtRest(lines), { 0.5, 0.1 }),
+    std::invalid_argument);
+  EXPECT_THROW(SignsOfPlacement(lines, { {}, {}, { {}, {} } }, AtRest(lines), { 0.5, 0.1 }),
+    std::invalid_argument);
 }
 }

@@ -84,7 +84,9 @@ std::vector<double> Values(vtkPolyData* data, const char* name)
 }
 
 /// The tree at these moments, as what was tracked.
-PoseSequence PosesOf(Series& series, const std::vector<double>& times)
+/// @param sights  gets what the images showed there
+PoseSequence PosesOf(
+  Series& series, const std::vector<double>& times, std::vector<LumenSight>& sights)
 {
   PoseSequence poses;
   poses.times = times;
@@ -97,6 +99,7 @@ PoseSequence PosesOf(Series& series, const std::vector<double>& times)
     {
       poses.status.back().push_back(static_cast<TrackingStatus>(static_cast<int>(value)));
     }
+    sights.push_back({ Values(data, names::LumenBeside), Values(data, names::LumenContrast) });
   }
   return poses;
 }
@@ -151,7 +154,7 @@ void PrintHead()
   {
     std::printf(",%s", name.c_str());
   }
-  std::printf("\n");
+  std::printf(",distance\n");
 }
 
 void Judge(const std::string& run, const std::string& truth, const std::string& condition,
@@ -164,7 +167,6 @@ void Judge(const std::string& run, const std::string& truth, const std::string& 
   }
   const auto report = nlohmann::json::parse(file);
   const auto& motion = report.at("motion");
-  const double limit = PlacedWithin + shift;
   Series found(run + "/motion/centerline.vtp.series");
   Series real(truth + "/centerline.pvd");
   const auto times = motion.at("tracked_times").get<std::vector<double>>();
@@ -173,11 +175,11 @@ void Judge(const std::string& run, const std::string& truth, const std::string& 
     1e-3 * report.at("settings").at("temporal_window_ms").get<double>() /
       FieldNumber(first, names::CycleLength) };
   const Polylines rest = LinesOf(found.At(timing.reference));
-  VesselTree tree;
-  vtkCoronary::AddPointValues(first, tree);
-  const PoseSequence poses = PosesOf(found, times);
+  PlacementEvidence evidence{ Values(first, names::Confidence),
+    Values(first, names::OstiumConfidence), {} };
+  const PoseSequence poses = PosesOf(found, times, evidence.sights);
   const std::vector<std::vector<PlacementSigns>> signs =
-    SignsOfPlacement(rest, tree.confidence, poses, timing);
+    SignsOfPlacement(rest, evidence, poses, timing);
   for (std::size_t k = 0; k < times.size(); ++k)
   {
     const Polylines truly = LinesOf(real.At(times[k]));
@@ -188,7 +190,8 @@ void Judge(const std::string& run, const std::string& truth, const std::string& 
       {
         continue;
       }
-      const bool placed = MeanDistance(line, poses.points[k], truly) <= limit;
+      const double distance = std::max(0.0, MeanDistance(line, poses.points[k], truly) - shift);
+      const bool placed = distance <= PlacedWithin;
       const Vector3& middle = rest.points[line[line.size() / 2]];
       std::printf("%s,%s,%d,1,%.4f,%.1f,%.1f,%.1f", condition.c_str(), seed.c_str(), placed ? 1 : 0,
         PlacementConfidence(signs[k][l]), middle[0], middle[1], middle[2]);
@@ -196,7 +199,7 @@ void Judge(const std::string& run, const std::string& truth, const std::string& 
       {
         std::printf(",%.4f", value);
       }
-      std::printf("\n");
+      std::printf(",%.2f\n", distance);
     }
   }
 }
