@@ -3,6 +3,7 @@
 #include "FoamMesh.h"
 #include "Require.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -11,6 +12,9 @@ namespace coronary
 namespace
 {
 using NamedText = std::pair<std::string, std::string>;
+
+/// The solver's motion lags where the mesh is not orthogonal: in greater steps than these it folds.
+constexpr int LeastCheckedSteps = 100;
 
 /// Of scripts: Debian's programs do not find their files by themselves.
 const std::string Environment =
@@ -320,7 +324,8 @@ std::string DynamicMesh(const FoamCase& flow)
   return text + Entry("dynamicFvMesh", "dynamicMotionSolverFvMesh") +
     Entry("motionSolverLibs", "(fvMotionSolvers)") +
     Entry("motionSolver", "displacementLaplacian") +
-    Block("displacementLaplacianCoeffs", Entry("diffusivity", "uniform", 1));
+    Block("displacementLaplacianCoeffs",
+      Entry("diffusivity", "inverseDistance (" + flow.wall + ")", 1));
 }
 
 std::string Readme(const FoamCase& flow)
@@ -432,7 +437,7 @@ std::vector<NamedText> FoamCaseFiles(const FoamCase& flow)
         Short(flow.cycle) +
         ";/' "
         "-e 's/^deltaT .*/deltaT " +
-        Short(flow.cycle / flow.picturesPerCycle) +
+        Short(flow.cycle / std::max(flow.stepsPerCycle / 10, LeastCheckedSteps)) +
         ";/' \"$copy/system/controlDict\"\n"
         "moveDynamicMesh -case \"$copy\" > log.check\n"
         "grep -c 'Mesh OK' log.check\n! grep -n -e '[*][*][*]' -e 'Failed' log.check\n");

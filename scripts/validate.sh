@@ -54,6 +54,7 @@ tables=(
   "scanned | scripts/validate-scanned.py --build BUILD --output OUTPUT | scripts/validate-scanned.py --quick --build BUILD --output OUTPUT"
   "reconstructor | validate-reconstructor | validate-reconstructor --quick"
   "peers | scripts/validate-peers.py --build BUILD --output OUTPUT | scripts/validate-peers.py --quick --build BUILD --output OUTPUT"
+  "flow | scripts/validate-flow.py --build BUILD --output OUTPUT/flow | -"
   "simulator | scripts/validate-simulator.sh BUILD | scripts/validate-simulator.sh --quick BUILD"
 )
 
