@@ -17,6 +17,7 @@ USES = {
     "Readers": ["Formats"],
     "Writers": ["Formats"],
     "Filters/Centerline": ["Formats"],  # edits by hand are a file
+    "Filters/Flow": ["Filters/Common", "Filters/Volume", "Filters/Skinning"],  # no module: algorithms only
     "Filters/Motion": ["Filters/Centerline"],  # the names say where the heart is
     "Filters/Skinning": ["Formats"],  # a cache of weights is a file
     "Applications/Common": [FILTERS, "Formats"],

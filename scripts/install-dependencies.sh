@@ -4,12 +4,13 @@ set -euo pipefail
 
 usage() {
   cat <<'EOF'
-Usage: scripts/install-dependencies.sh [--check] [--tree paraview|vtk] [--no-tests] [--nightly] [--developer]
+Usage: scripts/install-dependencies.sh [--check] [--tree paraview|vtk] [--no-tests] [--nightly] [--developer] [--flow]
   --check      change nothing; name what is missing and exit 1, exit 0 when all is there
   --tree TREE  packages of one tree only (both without this option)
   --no-tests   without the browser and what else only tests use
   --nightly    Google's benchmark library, and ITK and elastix, which are compared with, as well
   --developer  what --nightly adds, and clang, valgrind, heaptrack, clang-tidy, shellcheck
+  --flow       OpenFOAM as well, for scripts/demo-flow.sh and scripts/validate-flow.py
 Runs as root, or through sudo. Run again, it changes nothing.
 EOF
 }
@@ -76,12 +77,14 @@ tests=(libgtest-dev libxtst6 "${browser[@]}" curl ca-certificates plastimatch py
 nightly=(libbenchmark-dev libinsighttoolkit5-dev elastix)
 # scripts/fuzz.sh, scripts/lint.sh, scripts/check-leaks.sh.
 developer=("${clang[@]}" valgrind heaptrack shellcheck)
+flow=(openfoam python3-numpy python3-matplotlib)
 
 check_only=no
 tree=all
 with_developer=no
 with_tests=yes
 with_nightly=no
+with_flow=no
 while [ $# -gt 0 ]; do
   case "$1" in
     --check) check_only=yes ;;
@@ -93,6 +96,7 @@ while [ $# -gt 0 ]; do
     --no-tests) with_tests=no ;;
     --nightly) with_nightly=yes ;;
     --developer) with_developer=yes ;;
+    --flow) with_flow=yes ;;
     -h | --help)
       usage
       exit 0
@@ -117,6 +121,9 @@ case "$tree" in
 esac
 if [ "$with_tests" = yes ]; then
   wanted+=("${tests[@]}")
+fi
+if [ "$with_flow" = yes ]; then
+  wanted+=("${flow[@]}")
 fi
 if [ "$with_nightly" = yes ] || [ "$with_developer" = yes ]; then
   wanted+=("${nightly[@]}")

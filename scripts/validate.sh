@@ -56,6 +56,7 @@ tables=(
   "peers | scripts/validate-peers.py --build BUILD --output OUTPUT | scripts/validate-peers.py --quick --build BUILD --output OUTPUT"
   "wall-speed | vessel-wall-benchmark --strict --benchmark_filter=^Refit --benchmark_repetitions=5 | vessel-wall-benchmark --benchmark_filter=^Refit --benchmark_min_time=0.01"
   "tick-speed | intervention-benchmark --strict --benchmark_filter=^Tick --benchmark_repetitions=3 | intervention-benchmark --benchmark_filter=^RodAlone --benchmark_min_time=0.01"
+  "flow | scripts/validate-flow.py --build BUILD --output OUTPUT/flow | -"
   "simulator | scripts/validate-simulator.sh BUILD | scripts/validate-simulator.sh --quick BUILD"
 )
 

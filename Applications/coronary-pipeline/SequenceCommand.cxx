@@ -5,6 +5,7 @@
 #include "Ranks.h"
 #include "StagedFolder.h"
 #include "vtkDataFiles.h"
+#include "vtkFlowCase.h"
 #include "vtkMessageTrap.h"
 #include "vtkMovingMesh.h"
 #include "vtkTimedPolyData.h"
@@ -60,6 +61,7 @@ struct SequenceJob
   int influences = 4;
   bool loop = true;
   double poor = 15.0;
+  FlowCaseSettings flow;
   int threads = 0;
   bool quiet = false;
 
@@ -67,6 +69,13 @@ struct SequenceJob
   void Run() const;
 
 private:
+  void DeclareFlow(CLI::App& app);
+  bool Wants(const char* format) const
+  {
+    return std::find(this->formats.begin(), this->formats.end(), format) != this->formats.end();
+  }
+  std::vector<std::string> WriteFlow(const FlowCaseInput& input, vtkTimedPolyData* source,
+    StagedFolder& folder, vtkMessageTrap& messages, ProgressDisplay& progress) const;
   std::vector<std::string> PoseFiles() const;
   std::vector<double> PhaseTimes(const std::vector<double>& ofPoses) const;
   void Choose(vtkMeshSequenceWriter* writer) const;
@@ -153,9 +162,11 @@ void SequenceJob::Declare(CLI::App& app)
   app
     .add_option("--formats", this->formats,
       "series (ParaView: .pvd and .series), simvascular (mesh-complete folders), vmtk; of the "
-      "surface obj, ply, stl, and gltf (one animated .glb) or gltf-json; several with commas")
-    ->check(
-      CLI::IsMember({ "series", "simvascular", "vmtk", "obj", "ply", "stl", "gltf", "gltf-json" }))
+      "surface obj, ply, stl, and gltf (one animated .glb) or gltf-json; openfoam (case folders "
+      "with a "
+      "mesh of their own); several with commas")
+    ->check(CLI::IsMember(
+      { "series", "simvascular", "vmtk", "obj", "ply", "stl", "gltf", "gltf-json", "openfoam" }))
     ->delimiter(',')
     ->allow_extra_args(false)
     ->type_name("LIST")
@@ -186,8 +197,69 @@ void SequenceJob::Declare(CLI::App& app)
     ->type_name("DEG")
     ->capture_default_str()
     ->group(files);
+  this->DeclareFlow(app);
   AddThreads(app, this->threads);
   app.add_flag("--quiet", this->quiet, "No progress and no summary");
+}
+
+void SequenceJob::DeclareFlow(CLI::App& app)
+{
+  const std::string group = "OpenFOAM (docs/flow.md)";
+  app
+    .add_option(
+      "--flow-tree", this->flow.tree, "Only this tree of the centerlines: 0 left, 1 right")
+    ->check(WholeWithin(0, 1000))
+    ->type_name("N")
+    ->group(group);
+  app.add_option("--flow-edge", this->flow.edge, "Edges of the wall, in local radii")
+    ->check(Within(0.1, 0.7))
+    ->type_name("RADII")
+    ->capture_default_str()
+    ->group(group);
+  app.add_option("--flow-layers", this->flow.layers, "Layers of prisms at the wall")
+    ->check(WholeWithin(1, 20))
+    ->type_name("N")
+    ->capture_default_str()
+    ->group(group);
+  app
+    .add_option("--flow-extension", this->flow.extension,
+      "Straight pieces before inlet and outlets, in diameters of the end")
+    ->check(Within(0.0, 20.0))
+    ->type_name("DIAMETERS")
+    ->capture_default_str()
+    ->group(group);
+  app
+    .add_option("--flow-mean", this->flow.meanFlow,
+      "Mean flow into each tree, mL/s. Default: 12.5 cm/s in the inlet's section")
+    ->check(Within(0.01, 100.0))
+    ->type_name("ML/S")
+    ->group(group);
+  app
+    .add_option_function<std::string>(
+      "--flow-blood",
+      [this](const std::string& model)
+      { this->flow.blood = model == "carreau" ? BloodModel::Carreau : BloodModel::Newtonian; },
+      "Viscosity: newtonian (3.5 mPa s, the default) or carreau")
+    ->check(CLI::IsMember({ "newtonian", "carreau" }))
+    ->type_name("MODEL")
+    ->group(group);
+  app.add_flag("--flow-rest", this->flow.rest, "The walls stand still, as they are at time 0")
+    ->group(group);
+  app.add_option("--flow-cycles", this->flow.cycles, "Cycles to simulate; the last one counts")
+    ->check(WholeWithin(1, 100))
+    ->type_name("N")
+    ->capture_default_str()
+    ->group(group);
+  app.add_option("--flow-steps", this->flow.steps, "Time steps a cycle")
+    ->check(WholeWithin(10, 1000000))
+    ->type_name("N")
+    ->capture_default_str()
+    ->group(group);
+  app.add_option("--flow-frames", this->flow.frames, "Frames of the walls' motion a cycle")
+    ->check(WholeWithin(2, 10000))
+    ->type_name("N")
+    ->capture_default_str()
+    ->group(group);
 }
 
 std::vector<std::string> SequenceJob::PoseFiles() const
@@ -228,8 +300,7 @@ std::vector<double> SequenceJob::PhaseTimes(const std::vector<double>& ofPoses) 
 
 void SequenceJob::Choose(vtkMeshSequenceWriter* writer) const
 {
-  const auto wanted = [&](const char* format)
-  { return std::find(this->formats.begin(), this->formats.end(), format) != this->formats.end(); };
+  const auto wanted = [&](const char* format) { return this->Wants(format); };
   writer->SetWriteSeries(wanted("series"));
   writer->SetWriteSimVascular(wanted("simvascular"));
   writer->SetWriteVmtk(wanted("vmtk"));
@@ -278,18 +349,45 @@ vtkSmartPointer<vtkPolyData> ReadOptional(
   return fs::exists(path, ignored) ? ReadPolyData(path.string(), messages) : nullptr;
 }
 
+std::vector<std::string> SequenceJob::WriteFlow(const FlowCaseInput& input,
+  vtkTimedPolyData* source, StagedFolder& folder, vtkMessageTrap& messages,
+  ProgressDisplay& progress) const
+{
+  vtkNew<vtkCardiacPhaseInterpolator> interpolator;
+  interpolator->SetInputConnection(source->GetOutputPort());
+  interpolator->SetMode(InterpolationMode(this->mode));
+  vtkNew<vtkSkinDeformation> deformation;
+  deformation->SetPoseConnection(interpolator->GetOutputPort());
+  deformation->SetInputData(1, input.rest);
+  deformation->SetBlend(Blends.at(this->blend));
+  deformation->SetVolumeConservation(this->volumeConservation);
+  deformation->SetTetrahedra(vtkSkinDeformation::IgnoreTetrahedra);
+  deformation->DoublePrecisionOn();
+  FlowCaseInput whole = input;
+  whole.deformation = deformation;
+  FlowCaseSettings settings = this->flow;
+  settings.cycle = this->cycleMs > 0.0 ? this->cycleMs / 1000.0 : source->CycleSeconds();
+  return WriteFlowCases(whole, settings, this->output, "mesh", folder, messages,
+    [&](double fraction) { progress.Update(fraction); });
+}
+
 void SequenceJob::Run() const
 {
   UseThreads(this->threads);
   const std::vector<std::string> poseFiles = this->PoseFiles();
   vtkMessageTrap messages;
-  ProgressDisplay progress("step", 2, this->quiet || !Ranks().IsFirst());
+  ProgressDisplay progress(
+    "step", this->Wants("openfoam") ? 3 : 2, this->quiet || !Ranks().IsFirst());
   progress.BeginStep(0, "reading");
   const auto mesh =
     ReadUnstructuredGrid((fs::path(this->result) / "weights.vtu").string(), messages);
   const auto rest = ReadPolyData((fs::path(this->result) / "skeleton.vtp").string(), messages);
   const auto boundary = ReadOptional(this->result, "volume_boundary.vtp", messages);
   const auto caps = ReadOptional(this->result, "caps.vtp", messages);
+  const bool withFlow = this->Wants("openfoam");
+  const auto trees = withFlow
+    ? ReadPolyData((fs::path(this->result) / "centerline.vtp").string(), messages)
+    : nullptr;
   const auto source = ReadTimedPolyData(poseFiles, this->poseTimes, messages);
   if (mesh->GetNumberOfCells() == 0)
   {
@@ -325,12 +423,26 @@ void SequenceJob::Run() const
     moving.Writer->SetInputData(2, caps);
   }
   this->Choose(moving.Writer);
-  progress.BeginStep(1, "phases");
   const std::unique_ptr<StagedFolder> folder = Ranks().MakeFolder(this->output);
-  moving.Writer->SetSharing(&Ranks(), folder.get());
-  moving.Write((fs::path(this->output) / "mesh.json").string(),
-    this->PhaseTimes(source->GetTimes()), messages,
-    [&](double fraction) { progress.Update(fraction); });
+  std::vector<std::string> cases;
+  if (withFlow)
+  {
+    progress.BeginStep(1, "OpenFOAM");
+    if (Ranks().IsFirst())
+    {
+      cases = this->WriteFlow({ trees, mesh, rest }, source, *folder, messages, progress);
+    }
+  }
+  const bool withSequence = std::any_of(this->formats.begin(), this->formats.end(),
+    [](const std::string& format) { return format != "openfoam"; });
+  if (withSequence)
+  {
+    progress.BeginStep(withFlow ? 2 : 1, "phases");
+    moving.Writer->SetSharing(&Ranks(), folder.get());
+    moving.Write((fs::path(this->output) / "mesh.json").string(),
+      this->PhaseTimes(source->GetTimes()), messages,
+      [&](double fraction) { progress.Update(fraction); });
+  }
   if (Ranks().IsFirst())
   {
     folder->Commit();
@@ -341,8 +453,15 @@ void SequenceJob::Run() const
   }
   if (!this->quiet && Ranks().IsFirst())
   {
-    std::printf(
-      "%s: %s\n", this->output.c_str(), this->Summary(moving.Writer->GetQuality()).c_str());
+    if (withSequence)
+    {
+      std::printf(
+        "%s: %s\n", this->output.c_str(), this->Summary(moving.Writer->GetQuality()).c_str());
+    }
+    for (const std::string& sentence : cases)
+    {
+      std::printf("%s/%s\n", this->output.c_str(), sentence.c_str());
+    }
   }
 }
 }
@@ -351,12 +470,13 @@ Command MakeSequenceCommand(CLI::App& program)
 {
   CLI::App* app = program.add_subcommand("sequence",
     "One mesh over the heart cycle, for simulations and viewers: series, SimVascular, VMTK, "
-    "OBJ, PLY, STL, glTF");
+    "OBJ, PLY, STL, glTF, OpenFOAM");
   app->footer(
     "Writes DIR/mesh.json and mesh_quality.csv; series: mesh_volume_000.vtu .., "
     "mesh_surface_000.vtp .., their .pvd and .series; simvascular: "
     "mesh_simvascular/phase_000/mesh-complete ..; vmtk: mesh_vmtk_000.vtu ..; obj, ply, stl: "
-    "mesh_surface_000.obj ..; gltf: mesh_skin.glb.");
+    "mesh_surface_000.obj ..; gltf: mesh_skin.glb; openfoam: mesh_openfoam_VESSEL/, a case a "
+    "tree.");
   auto job = std::make_shared<SequenceJob>();
   job->Declare(*app);
   return { app, [job] { job->Run(); }, true };

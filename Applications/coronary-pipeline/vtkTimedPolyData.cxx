@@ -6,6 +6,8 @@
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 
+#include "vtkCoronaryArrayNames.h"
+#include "vtkDataArray.h"
 #include "vtkFieldData.h"
 #include "vtkInformation.h"
 #include "vtkInformationVector.h"
@@ -14,6 +16,7 @@
 #include "vtkStreamingDemandDrivenPipeline.h"
 
 #include <algorithm>
+#include <cmath>
 
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
@@ -36,6 +39,15 @@ void vtkTimedPolyData::Add(double time, vtkPolyData* data)
 bool vtkTimedPolyData::Find(const char* fieldArray) const
 {
   return !this->Steps.empty() && this->Steps.front()->GetFieldData()->HasArray(fieldArray) != 0;
+}
+
+double vtkTimedPolyData::CycleSeconds() const
+{
+  vtkDataArray* length = this->Steps.empty()
+    ? nullptr
+    : this->Steps.front()->GetFieldData()->GetArray(vtkCoronaryArrayNames::CycleLength);
+  const double seconds = length && length->GetNumberOfValues() > 0 ? length->GetTuple1(0) : 0.0;
+  return seconds > 0.0 && std::isfinite(seconds) ? seconds : 1.0;
 }
 
 int vtkTimedPolyData::RequestInformation(

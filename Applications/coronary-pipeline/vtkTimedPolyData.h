@@ -31,6 +31,9 @@ public:
   /// Whether the data of the first time have a field array.
   bool Find(const char* fieldArray) const;
 
+  /// Of a cycle (`CycleLength`); 1 where the data do not say.
+  double CycleSeconds() const;
+
 protected:
   vtkTimedPolyData();
   ~vtkTimedPolyData() override;

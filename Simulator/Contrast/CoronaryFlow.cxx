@@ -2,6 +2,7 @@
 
 #include "CyclicTime.h"
 #include "Fnv1a.h"
+#include "HeartPressures.h"
 #include "Require.h"
 
 #include <algorithm>
@@ -14,11 +15,6 @@ namespace
 {
 constexpr double Pi = 3.14159265358979323846;
 constexpr double PascalPerMmHg = 133.322387415;
-constexpr double EndDiastolicPressure = 8.0;   // left ventricle, mmHg
-constexpr double EarlyDiastolicPressure = 5.0; // mmHg
-constexpr double RelaxationTime = 0.08;        // isovolumic, fraction of R-R
-constexpr double NotchHeight = 0.6; // of the pulse pressure, that is left when the valve closes
-constexpr double RunOff = 1.5;      // exponent of the aorta's fall over diastole
 constexpr double ReferenceLength = 100.0; // mm
 constexpr double OutletLength = 10.0;     // mm before a tip whose mean radius is the outlet's
 constexpr double FlowReserve = 4.0;       // Gould, Lipscomb, Hamilton, Am J Cardiol 1974;33:87
@@ -27,17 +23,10 @@ constexpr int StepsOfCycle = 160;
 
 constexpr RequireOf RequireSetting{ "coronary flow" };
 
-/// From `a` at t = 0 to `b` at t = 1, level at both.
-double HalfCosine(double a, double b, double t)
+HeartPressures PressuresOf(const CoronaryFlowSettings& settings)
 {
-  return a + (b - a) * 0.5 * (1.0 - std::cos(Pi * t));
-}
-
-/// When the valve closes.
-double NotchPressure(const CoronaryFlowSettings& settings)
-{
-  return settings.diastolicPressure +
-    NotchHeight * (settings.systolicPressure - settings.diastolicPressure);
+  return { settings.systolicPressure, settings.diastolicPressure, settings.ejectionBegin,
+    settings.systoleEnd };
 }
 
 /// integral ds / r^4 where r goes from a to b over a length, 1/mm^3.
@@ -128,43 +117,12 @@ void CoronaryFlowSettings::Validate() const
 
 double AorticPressure(const CoronaryFlowSettings& settings, double phase)
 {
-  const double length = settings.systoleEnd - settings.ejectionBegin;
-  const double since = Modulo(Modulo(phase) - settings.ejectionBegin);
-  const double notch = NotchPressure(settings);
-  if (since < 0.5 * length)
-  {
-    return HalfCosine(
-      settings.diastolicPressure, settings.systolicPressure, since / (0.5 * length));
-  }
-  if (since < length)
-  {
-    return HalfCosine(settings.systolicPressure, notch, since / (0.5 * length) - 1.0);
-  }
-  const double t = (since - length) / (1.0 - length);
-  const double last = std::exp(-RunOff);
-  return settings.diastolicPressure +
-    (notch - settings.diastolicPressure) * (std::exp(-RunOff * t) - last) / (1.0 - last);
+  return PressuresOf(settings).Aortic(phase);
 }
 
 double VentricularPressure(const CoronaryFlowSettings& settings, double phase)
 {
-  const double u = Modulo(phase);
-  if (u < settings.ejectionBegin)
-  {
-    return HalfCosine(EndDiastolicPressure, settings.diastolicPressure, u / settings.ejectionBegin);
-  }
-  if (u < settings.systoleEnd)
-  {
-    return AorticPressure(settings, u);
-  }
-  const double relaxed = settings.systoleEnd + RelaxationTime;
-  if (u < relaxed)
-  {
-    return HalfCosine(
-      NotchPressure(settings), EarlyDiastolicPressure, (u - settings.systoleEnd) / RelaxationTime);
-  }
-  return EarlyDiastolicPressure +
-    (EndDiastolicPressure - EarlyDiastolicPressure) * (u - relaxed) / (1.0 - relaxed);
+  return PressuresOf(settings).Ventricular(phase);
 }
 
 CoronaryFlow::CoronaryFlow(const WallTopology& topology, const CoronaryFlowSettings& settings)

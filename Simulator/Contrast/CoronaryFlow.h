@@ -65,11 +65,11 @@ struct CoronaryFlowSettings
   void Validate() const;
 };
 
-/// Pressure in the aorta's root, mmHg, at a phase (modulo 1). Rises and falls by half cosines in ejection, and
-/// exponentially falls in diastole.
+///@{
+/// As HeartPressures, mmHg.
 double AorticPressure(const CoronaryFlowSettings& settings, double phase);
-/// In the left ventricle: the aortic one in ejection, 5 to 8 mmHg in filling.
 double VentricularPressure(const CoronaryFlowSettings& settings, double phase);
+///@}
 
 /**
  * Segments: laminar flow, resistance 8 eta / pi integral ds / r^4, exact for truncated cones between the axis'

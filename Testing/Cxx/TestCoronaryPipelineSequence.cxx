@@ -2,6 +2,7 @@
 #include "AtomicFile.h"
 #include "FileSeries.h"
 #include "SequenceTestData.h"
+#include "vtkVesselTree.h"
 
 #include "vtkXMLPolyDataWriter.h"
 #include "vtkXMLUnstructuredGridReader.h"
@@ -14,6 +15,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -76,6 +78,26 @@ protected:
   void Put(const std::string& name, const std::string& text) const
   {
     coronary::WriteFileAtomically((this->Folder / name).string(), text);
+  }
+
+  /// A named vessel inside of the bar.
+  void PutCenterline() const
+  {
+    coronary::VesselTree tree;
+    coronary::VesselTree::Branch branch;
+    for (int k = 0; k <= 20; ++k)
+    {
+      tree.points.emplace_back(0.0, 0.0, 5.0 * Bones * k / 20.0);
+      tree.radius.push_back(1.2);
+      branch.points.push_back(k);
+    }
+    branch.treeId = 1;
+    branch.segmentId = 1;
+    tree.branches.push_back(branch);
+    coronary::MeasureTree(tree);
+    vtkNew<vtkPolyData> lines;
+    vtkCoronary::SetTree(lines, tree, vtkCoronary::BranchArrays::Named);
+    Save(vtkNew<vtkXMLPolyDataWriter>(), lines, this->Folder / "result/centerline.vtp");
   }
 
   /// Runs `sequence` in the folder.
@@ -150,6 +172,69 @@ TEST_F(TestCoronaryPipelineSequence, PhasesOfOneTopologyInAllFormats)
                           .c_str()),
     0)
     << "another number of threads gave other files";
+}
+
+TEST_F(TestCoronaryPipelineSequence, CasesForOpenFoamReplaceOlderOnesButNoResults)
+{
+  this->PutCenterline();
+  const std::string options =
+    "result --formats openfoam --flow-frames 8 --flow-layers 2 --flow-edge 0.5 "
+    "--flow-extension 0.5 --threads 1 --output out";
+  ASSERT_EQ(this->Run(options + " --cycle-ms 800"), 0) << ReadText(this->Folder / "stderr");
+  const fs::path folder = this->Folder / "out/mesh_openfoam_pRCA";
+  const std::string said = ReadText(this->Folder / "stdout");
+  EXPECT_NE(said.find("out/mesh_openfoam_pRCA: "), std::string::npos) << said;
+  EXPECT_EQ(said.find("will not bear"), std::string::npos) << said;
+  for (const char* name :
+    { "constant/polyMesh/points", "0/U", "0/p", "0/pointDisplacement", "system/controlDict",
+      "constant/boundaryData/wall/points", "constant/boundaryData/inlet/0.8/pointDisplacement",
+      "constant/boundaryData/outlet_pRCA/0.1/pointDisplacement", "README.md", "Allrun",
+      "case.foam" })
+  {
+    EXPECT_TRUE(fs::is_regular_file(folder / name)) << name;
+  }
+  // No point of the wall has moved at first, nor after the whole cycle; half way between, some has.
+  const std::string first = ReadText(folder / "constant/boundaryData/wall/0/pointDisplacement");
+  EXPECT_EQ(ReadText(folder / "constant/boundaryData/wall/0.8/pointDisplacement"), first);
+  EXPECT_NE(ReadText(folder / "constant/boundaryData/wall/0.2/pointDisplacement"), first);
+  std::istringstream rows(ReadText(folder / "quality.csv"));
+  std::string row;
+  std::getline(rows, row);
+  int frames = 0;
+  for (; std::getline(rows, row); ++frames)
+  {
+    std::istringstream numbers(row);
+    std::vector<double> values;
+    for (std::string value; std::getline(numbers, value, ',');)
+    {
+      values.push_back(std::stod(value));
+    }
+    ASSERT_EQ(values.size(), 7U) << row;
+    EXPECT_GT(values[1], 0.0) << row;
+    EXPECT_EQ(values[2], 0.0) << row;
+    EXPECT_GT(values[6], 0.5) << row;
+  }
+  EXPECT_EQ(frames, 9);
+
+  // A shorter one, at rest, with other names: nothing of the old one stays.
+  ASSERT_EQ(this->Run(options + " --flow-rest --flow-blood carreau --quiet"), 0)
+    << ReadText(this->Folder / "stderr");
+  EXPECT_FALSE(fs::exists(folder / "constant/boundaryData"));
+  EXPECT_NE(
+    ReadText(folder / "constant/transportProperties").find("BirdCarreau"), std::string::npos);
+  EXPECT_EQ(ReadText(folder / "0/U").find("pos()"), std::string::npos);
+
+  // Results belong to the mesh that is there.
+  const std::string before = ReadText(folder / "0/U");
+  fs::create_directories(folder / "0.05");
+  EXPECT_EQ(this->Run(options + " --quiet"), 1);
+  EXPECT_NE(
+    ReadText(this->Folder / "stderr").find("has results of a solver (0.05)"), std::string::npos)
+    << ReadText(this->Folder / "stderr");
+  EXPECT_EQ(ReadText(folder / "0/U"), before);
+  this->ExpectFailure(1, "result --formats openfoam --flow-tree 3", "no tree 3");
+  fs::remove(this->Folder / "result/centerline.vtp");
+  this->ExpectFailure(1, "result --formats openfoam", "centerline.vtp");
 }
 
 TEST_F(TestCoronaryPipelineSequence, TheKhronosValidatorFindsNothing)
