@@ -29,7 +29,8 @@ constexpr int MostCores = 6;         // meshes of the core, until none of its te
 constexpr double FlatAngle = 0.0873; // radians (5 degrees)
 constexpr int NormalSmoothing = 4;
 constexpr int CapSweeps = 400;
-constexpr double RimStep = 1.0; // distance of an extension's rings in edges of the rim
+constexpr double Rounding = 1e-9; // of places
+constexpr double RimStep = 1.0;   // distance of an extension's rings in edges of the rim
 
 using Edge = std::pair<std::int64_t, std::int64_t>;
 
@@ -790,9 +791,9 @@ Vector3 LayeredMesh::WithoutExtension(const Vector3& point) const
     const Vector3 from = point - end.centre;
     const double along = end.outwards.dot(from);
     const double beside = (from - along * end.outwards).norm();
-    // Of a straight end, nothing else is so near to its axis: 1.5 allows for sections that are not round.
-    if (end.length > 0.0 && along > 0.0 && along <= end.length * (1.0 + 1e-9) &&
-      beside < 1.5 * end.radius)
+    // Nothing else can be inside of a straight piece.
+    if (end.length > 0.0 && along > 0.0 && along <= end.length * (1.0 + Rounding) &&
+      beside <= end.reach * (1.0 + Rounding))
     {
       return point - along * end.outwards;
     }
@@ -818,8 +819,17 @@ LayeredMesh MakeLayeredMesh(const CappedSurface& given, const LayeredMeshSetting
   {
     const auto own = settings.extensionOf.find(cap.entity);
     const double diameters = own != settings.extensionOf.end() ? own->second : settings.extension;
-    ends.push_back(
-      { cap.entity, cap.centre, cap.normal, cap.radius, 2.0 * cap.radius * diameters });
+    EndExtension end;
+    end.entity = cap.entity;
+    end.centre = cap.centre;
+    end.outwards = cap.normal;
+    end.radius = cap.radius;
+    end.length = 2.0 * cap.radius * diameters;
+    for (const std::int64_t p : cap.rim)
+    {
+      end.reach = std::max(end.reach, (surface.points[p] - cap.centre).norm());
+    }
+    ends.push_back(end);
     if (diameters > 0.0)
     {
       Extend(surface, cap, ends.back().length);

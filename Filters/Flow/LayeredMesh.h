@@ -49,6 +49,7 @@ struct EndExtension
   Vector3 centre = Vector3::Zero();    ///< of the end that the surface had
   Vector3 outwards = Vector3::UnitZ(); ///< unit
   double radius = 0.0;                 ///< of the end: of a circle of its area
+  double reach = 0.0;                  ///< greatest distance of its rim from the centre, mm
   double length = 0.0;                 ///< mm; 0: none
 };
 
