@@ -102,6 +102,12 @@ class Volume:
         return [(min(c[r] for c in corners), max(c[r] for c in corners)) for r in range(3)]
 
 
+def matplotlib_preset(name):
+    """Name of a colour map in ParaView: from version 6 on it has no addition."""
+    from paraview import simple
+    return name if simple.GetParaViewVersion().major >= 6 else name + " (matplotlib)"
+
+
 def read_poly(path):
     if not os.path.isfile(path):
         fail("missing file: " + path)

@@ -9,6 +9,7 @@ motion.png  left: centerlines at eight moments of a cycle, coloured by branch; r
 import argparse
 import os
 
+import pictures
 from paraview import servermanager, simple
 from vtkmodules.vtkCommonCore import vtkDoubleArray, vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
@@ -94,7 +95,7 @@ tubes.Vectors = [None, ""]
 display = simple.Show(tubes, second)
 simple.ColorBy(display, ("POINTS", "Speed"))
 transfer = simple.GetColorTransferFunction("Speed")
-transfer.ApplyPreset("Viridis (matplotlib)", True)
+transfer.ApplyPreset(pictures.matplotlib_preset("Viridis"), True)
 transfer.RescaleTransferFunction(0.0, 120.0)
 display.Opacity = 0.7
 display.SetScalarBarVisibility(second, True)

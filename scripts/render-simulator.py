@@ -12,6 +12,7 @@ import csv
 import glob
 import os
 
+import pictures
 from paraview import simple
 from vtkmodules.vtkCommonCore import vtkDoubleArray, vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
@@ -81,7 +82,7 @@ for place, folder in enumerate(arguments.sessions):
     balls.UpdatePipeline()
     ball = simple.Show(balls, view)
     simple.ColorBy(ball, ("POINTS", "seconds"))
-    simple.GetColorTransferFunction("seconds").ApplyPreset("Plasma (matplotlib)", True)
+    simple.GetColorTransferFunction("seconds").ApplyPreset(pictures.matplotlib_preset("Plasma"), True)
     ball.SetScalarBarVisibility(view, False)
     bounds = (lines if arguments.only_artery else surface).GetDataInformation().GetBounds()
     middle = [0.5 * (bounds[0] + bounds[1]), 0.5 * (bounds[2] + bounds[3]), 0.5 * (bounds[4] + bounds[5])]

@@ -151,6 +151,13 @@ double Energy(const Eigen::MatrixXd& q, const Eigen::MatrixXd& weights)
   return 0.5 * (weights.transpose() * q * weights).trace();
 }
 
+/// Eigen 5 has `all` elsewhere than Eigen 3.
+template <typename Rows>
+Eigen::MatrixXd RowsOf(const Eigen::MatrixXd& matrix, const Rows& rows)
+{
+  return matrix(rows, Eigen::seqN(0, matrix.cols()));
+}
+
 /// All bones at once, sums 1: the reference of Joint.
 Eigen::MatrixXd JointReference(const SkinWeightInput& input, const Eigen::MatrixXd& q)
 {
@@ -158,7 +165,7 @@ Eigen::MatrixXd JointReference(const SkinWeightInput& input, const Eigen::Matrix
   const auto n = static_cast<Eigen::Index>(fixed.free.size());
   const Eigen::Index bones = fixed.values.cols();
   const Eigen::MatrixXd inner = q(fixed.free, fixed.free);
-  const Eigen::MatrixXd outer = q(fixed.free, Eigen::all) * fixed.values;
+  const Eigen::MatrixXd outer = RowsOf(q, fixed.free) * fixed.values;
   Eigen::MatrixXd h = Eigen::MatrixXd::Zero(n * bones, n * bones);
   Eigen::VectorXd c(n * bones);
   Eigen::MatrixXd a = Eigen::MatrixXd::Zero(n, n * bones);
@@ -183,7 +190,7 @@ Eigen::MatrixXd IndependentReference(const SkinWeightInput& input, const Eigen::
   const FixedPoints fixed = Constraints(input);
   const auto n = static_cast<Eigen::Index>(fixed.free.size());
   Eigen::MatrixXd weights = fixed.values;
-  const Eigen::MatrixXd outer = q(fixed.free, Eigen::all) * fixed.values;
+  const Eigen::MatrixXd outer = RowsOf(q, fixed.free) * fixed.values;
   Eigen::MatrixXd h = Eigen::MatrixXd::Zero(2 * n, 2 * n);
   h.topLeftCorner(n, n) = q(fixed.free, fixed.free);
   Eigen::MatrixXd a(n, 2 * n);
@@ -287,10 +294,8 @@ TEST(BiharmonicSkinWeights, WithoutBoundsAgreesWithDenseSolve)
   const Eigen::MatrixXd q = DenseBilaplacian(input);
   const FixedPoints fixed = Constraints(input);
   Eigen::MatrixXd reference = fixed.values;
-  reference(fixed.free, Eigen::all) =
-    -q(fixed.free, fixed.free)
-       .llt()
-       .solve(Eigen::MatrixXd(q(fixed.free, Eigen::all) * fixed.values));
+  reference(fixed.free, Eigen::seqN(0, reference.cols())) =
+    -q(fixed.free, fixed.free).llt().solve(Eigen::MatrixXd(RowsOf(q, fixed.free) * fixed.values));
   const SkinWeights weights = ComputeSkinWeights(input, Settings(SkinWeightMode::Unbounded));
   EXPECT_LT((Dense(weights) - reference).cwiseAbs().maxCoeff(), 1e-9);
   EXPECT_NEAR(weights.energy / Energy(q, reference), 1.0, 1e-9);
