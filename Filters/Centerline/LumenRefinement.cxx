@@ -137,6 +137,32 @@ private:
   BlurredProfile Thinner;
 };
 
+/// Normal equations of weighted residuals.
+template <int Count>
+struct FitEquations
+{
+  using Matrix = Eigen::Matrix<double, Count, Count>;
+  using Vector = Eigen::Matrix<double, Count, 1>;
+
+  Matrix normal = Matrix::Zero();
+  Vector right = Vector::Zero();
+  double squares = 0.0;
+  double area = 0.0;
+
+  /// @param share  independent values that this one stands for
+  void Add(const Vector& row, double residual, double share, double noise)
+  {
+    // What fits badly is something else.
+    const double far = residual / (4.0 * noise);
+    const double weight = share / (1.0 + far * far);
+    this->normal += weight * row * row.transpose();
+    this->right += weight * residual * row;
+    this->squares += weight * residual * residual;
+    this->area += weight;
+  }
+  double Misfit() const { return std::sqrt(this->squares / this->area); }
+};
+
 class SectionFitter
 {
 public:
@@ -350,17 +376,14 @@ private:
   bool Solve(const PolarSection& section, const Prior& prior,
     const std::array<double, Rays>& around, const std::array<char, Rays>& counts, Fit& fit) const
   {
-    using Matrix4 = Eigen::Matrix4d;
-    using Vector4 = Eigen::Vector4d;
+    using Matrix4 = FitEquations<4>::Matrix;
+    using Vector4 = FitEquations<4>::Vector;
     const double patch = this->Patch();
     const double most = section.count * section.step - RingStart * this->Blur;
     double noise = std::max(prior.noise, 1e-6);
     for (int iteration = 0; iteration < 4; ++iteration)
     {
-      Matrix4 normal = Matrix4::Zero();
-      Vector4 right = Vector4::Zero();
-      double squares = 0.0;
-      double area = 0.0;
+      FitEquations<4> equations;
       const DiscShares lumen(fit.radius, this->Blur);
       for (int ray = 0; ray < Rays; ++ray)
       {
@@ -394,25 +417,18 @@ private:
           const double inverse = distance > 1e-9 ? 1.0 / distance : 0.0;
           const Vector4 row(-contrast * share.byDistance * dx * inverse,
             -contrast * share.byDistance * dy * inverse, contrast * share.byRadius, share.value);
-          // What fits badly is something else.
-          const double far = residual / (4.0 * noise);
-          const double weight =
-            rho * section.step * (2.0 * M_PI / Rays) / patch / (1.0 + far * far);
-          normal += weight * row * row.transpose();
-          right += weight * residual * row;
-          squares += weight * residual * residual;
-          area += weight;
+          equations.Add(row, residual, rho * section.step * (2.0 * M_PI / Rays) / patch, noise);
         }
       }
-      if (!(area > 0.0))
+      if (!(equations.area > 0.0))
       {
         return false;
       }
-      fit.misfit = std::sqrt(squares / area);
+      fit.misfit = equations.Misfit();
       noise = std::max(prior.noise, fit.misfit);
       const double precision = 1.0 / (noise * noise);
-      Matrix4 information = precision * normal;
-      Vector4 gradient = precision * right;
+      Matrix4 information = precision * equations.normal;
+      Vector4 gradient = precision * equations.right;
       const double held = 1.0 / (prior.shift * prior.shift);
       information(0, 0) += held;
       information(1, 1) += held;
@@ -539,17 +555,14 @@ private:
     const std::array<double, Rays>& around, const std::array<char, Rays>& counts,
     WalledFit& fit) const
   {
-    using Matrix8 = Eigen::Matrix<double, 8, 8>;
-    using Vector8 = Eigen::Matrix<double, 8, 1>;
+    using Matrix8 = FitEquations<8>::Matrix;
+    using Vector8 = FitEquations<8>::Vector;
     const double contrast = std::max(1.0, prior.level - this->Background);
     const double patch = this->Patch();
     double noise = std::max(prior.noise, 1e-6);
     for (int iteration = 0; iteration < 4; ++iteration)
     {
-      Matrix8 normal = Matrix8::Zero();
-      Vector8 right = Vector8::Zero();
-      double squares = 0.0;
-      double area = 0.0;
+      FitEquations<8> equations;
       const DiscShares lumen(fit.lumen.radius, this->Blur);
       const DiscShares wall(fit.wall.radius, this->Blur);
       this->ForWalled(section, fit, counts,
@@ -574,20 +587,15 @@ private:
           add(fit.lumen, lumen, fit.wall.level, 0);
           row[7] -= row[3];
           const double residual = section.values[section.At(ray, n)] - value;
-          const double far = residual / (4.0 * noise);
-          const double weight = size / patch / (1.0 + far * far);
-          normal += weight * row * row.transpose();
-          right += weight * residual * row;
-          squares += weight * residual * residual;
-          area += weight;
+          equations.Add(row, residual, size / patch, noise);
         });
-      if (!(area > 0.0))
+      if (!(equations.area > 0.0))
       {
         return false;
       }
-      noise = std::max(prior.noise, std::sqrt(squares / area));
-      Matrix8 information = normal / (noise * noise);
-      Vector8 gradient = right / (noise * noise);
+      noise = std::max(prior.noise, equations.Misfit());
+      Matrix8 information = equations.normal / (noise * noise);
+      Vector8 gradient = equations.right / (noise * noise);
       const auto hold = [&](int n, double off, double deviation)
       {
         information(n, n) += 1.0 / (deviation * deviation);
