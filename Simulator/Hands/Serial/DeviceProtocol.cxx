@@ -13,28 +13,13 @@ namespace
 constexpr std::size_t NameSize = 16;
 constexpr std::size_t ErrorTextSize = 200;
 
-template <typename Content>
-constexpr MessageType TypeOf = MessageType::Stop;
-template <>
-constexpr MessageType TypeOf<HelloMessage> = MessageType::Hello;
-template <>
-constexpr MessageType TypeOf<HelloAckMessage> = MessageType::HelloAck;
-template <>
-constexpr MessageType TypeOf<CapsMessage> = MessageType::Caps;
-template <>
-constexpr MessageType TypeOf<StartMessage> = MessageType::Start;
-template <>
-constexpr MessageType TypeOf<StateMessage> = MessageType::State;
-template <>
-constexpr MessageType TypeOf<ForceMessage> = MessageType::Force;
-template <>
-constexpr MessageType TypeOf<HeartbeatMessage> = MessageType::Heartbeat;
-template <>
-constexpr MessageType TypeOf<PingMessage> = MessageType::Ping;
-template <>
-constexpr MessageType TypeOf<PongMessage> = MessageType::Pong;
-template <>
-constexpr MessageType TypeOf<CalibMessage> = MessageType::Calib;
+void PutLittle(std::uint8_t* bytes, std::uint64_t value, int size)
+{
+  for (int n = 0; n < size; ++n)
+  {
+    bytes[n] = static_cast<std::uint8_t>(value >> (8 * n));
+  }
+}
 
 /// The same calls as PayloadReader's, so that a payload is described once for both directions.
 class PayloadWriter
@@ -94,10 +79,8 @@ public:
 private:
   void Whole(std::uint64_t value, int bytes)
   {
-    for (int n = 0; n < bytes; ++n)
-    {
-      this->Made.payload[this->Made.size++] = static_cast<std::uint8_t>(value >> (8 * n));
-    }
+    PutLittle(&this->Made.payload[this->Made.size], value, bytes);
+    this->Made.size += static_cast<std::size_t>(bytes);
   }
 
   Message Made;
@@ -199,14 +182,6 @@ std::uint64_t Little(const std::uint8_t* bytes, int size)
     value |= static_cast<std::uint64_t>(bytes[n]) << (8 * n);
   }
   return value;
-}
-
-void PutLittle(std::uint8_t* bytes, std::uint64_t value, int size)
-{
-  for (int n = 0; n < size; ++n)
-  {
-    bytes[n] = static_cast<std::uint8_t>(value >> (8 * n));
-  }
 }
 
 bool IsKnown(MessageType type)
@@ -449,13 +424,13 @@ bool FrameDecoder::InSequence()
 template <typename Content>
 Message Encode(const Content& content)
 {
-  return Encoded(TypeOf<Content>, content);
+  return Encoded(Content::Type, content);
 }
 
 template <typename Content>
 bool Decode(const Message& message, Content& content)
 {
-  return Decoded(message, TypeOf<Content>, content);
+  return Decoded(message, Content::Type, content);
 }
 
 template Message Encode(const HelloMessage&);
@@ -482,7 +457,7 @@ Message Encode(const StateMessage& given)
 {
   StateMessage state = given;
   state.axes = static_cast<std::uint8_t>(std::min<std::size_t>(state.axes, MostAxes));
-  return Encoded(MessageType::State, state);
+  return Encoded(StateMessage::Type, state);
 }
 
 Message EncodeStop()

@@ -165,6 +165,8 @@ private:
 
 struct HelloMessage
 {
+  static constexpr MessageType Type = MessageType::Hello;
+
   std::uint8_t minMajor = ProtocolMajor;
   std::uint8_t maxMajor = ProtocolMajor;
   std::uint32_t nonce = 0;
@@ -173,6 +175,8 @@ struct HelloMessage
 
 struct HelloAckMessage
 {
+  static constexpr MessageType Type = MessageType::HelloAck;
+
   std::uint8_t major = ProtocolMajor;
   std::uint8_t minor = ProtocolMinor;
   std::uint32_t nonce = 0; ///< of the HELLO
@@ -183,6 +187,8 @@ struct HelloAckMessage
 /// Of one axis; a device sends as many as it has axes.
 struct CapsMessage
 {
+  static constexpr MessageType Type = MessageType::Caps;
+
   std::uint8_t index = 0; ///< from 0; place of its count in STATE
   std::uint8_t count = 1; ///< axes in all, 1 to MostAxes
   AxisKind kind = AxisKind::None;
@@ -197,6 +203,8 @@ struct CapsMessage
 
 struct StartMessage
 {
+  static constexpr MessageType Type = MessageType::Start;
+
   std::uint16_t rate = 1000;   ///< Hz that are wanted
   std::uint16_t watchdog = 20; ///< ms
   std::uint32_t nonce = 0;     ///< of the HELLO
@@ -212,6 +220,8 @@ enum DeviceStatusBit : std::uint16_t
 
 struct StateMessage
 {
+  static constexpr MessageType Type = MessageType::State;
+
   std::uint32_t tick = 0; ///< of the last FORCE or HEARTBEAT that was accepted
   std::uint16_t pedals = 0;
   std::uint16_t buttons = 0;
@@ -222,6 +232,8 @@ struct StateMessage
 
 struct ForceMessage
 {
+  static constexpr MessageType Type = MessageType::Force;
+
   std::uint32_t tick = 0;
   std::uint16_t validMilliseconds = 20;
   std::array<float, 2> force{};  ///< N: wire, catheter
@@ -230,17 +242,23 @@ struct ForceMessage
 
 struct HeartbeatMessage
 {
+  static constexpr MessageType Type = MessageType::Heartbeat;
+
   std::uint32_t tick = 0;
 };
 
 struct PingMessage
 {
+  static constexpr MessageType Type = MessageType::Ping;
+
   std::uint32_t number = 0;
   std::uint64_t hostMicroseconds = 0;
 };
 
 struct PongMessage
 {
+  static constexpr MessageType Type = MessageType::Pong;
+
   std::uint32_t number = 0;           ///< of the PING
   std::uint64_t hostMicroseconds = 0; ///< of the PING
   std::uint64_t deviceMicroseconds = 0;
@@ -269,6 +287,8 @@ struct ZeroMessage
 /// Either way: what a count is from now on.
 struct CalibMessage
 {
+  static constexpr MessageType Type = MessageType::Calib;
+
   std::uint8_t axis = 0;
   double perCount = 0.0;
 };
