@@ -51,8 +51,7 @@ pipeline="$root/build/paraview/bin/coronary-pipeline"
 
 if [ ! -e "$output/run/motion/skeleton.vtp.series" ]; then
   echo "== The run of scripts/demo.sh"
-  "$pipeline" phantom --seed 1 --phases 20 --spacing 0.5 --window 66 --noise 25 --output "$output/phantom"
-  "$pipeline" run "$output/phantom/series.json" --tracked even --output "$output/run"
+  scripts/demo.sh --no-install --no-pictures -j "$jobs"
 fi
 
 steps=1000

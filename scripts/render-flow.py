@@ -11,15 +11,15 @@ import argparse
 import os
 
 import numpy
+import pictures
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkPlane
 from vtkmodules.vtkFiltersCore import vtkCutter
 from vtkmodules.vtkFiltersExtraction import vtkExtractGeometry
 from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 from vtkmodules.vtkIOGeometry import vtkOpenFOAMReader
-from vtkmodules.vtkIOImage import vtkPNGWriter
 from vtkmodules.vtkRenderingAnnotation import vtkScalarBarActor
-from vtkmodules.vtkRenderingCore import vtkActor, vtkDataSetMapper, vtkRenderer, vtkRenderWindow, vtkWindowToImageFilter
+from vtkmodules.vtkRenderingCore import vtkActor, vtkDataSetMapper, vtkRenderer
 import vtkmodules.vtkRenderingFreeType  # noqa: F401
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401
 
@@ -65,9 +65,7 @@ def actor_of(data, color=(0.85, 0.87, 0.9), edges=True, array=None, limits=None)
 
 def picture(path, views, bar=None):
     """views: (actors, focus, direction, up, half height)."""
-    window = vtkRenderWindow()
-    window.SetOffScreenRendering(1)
-    window.SetSize(1500, 750)
+    renderers = []
     for k, (actors, focus, direction, up, size) in enumerate(views):
         renderer = vtkRenderer()
         renderer.SetBackground(1, 1, 1)
@@ -83,14 +81,8 @@ def picture(path, views, bar=None):
         camera.SetViewUp(*up)
         camera.SetParallelScale(size)
         renderer.ResetCameraClippingRange()
-        window.AddRenderer(renderer)
-    window.Render()
-    grab = vtkWindowToImageFilter()
-    grab.SetInput(window)
-    writer = vtkPNGWriter()
-    writer.SetFileName(path)
-    writer.SetInputConnection(grab.GetOutputPort())
-    writer.Write()
+        renderers.append(renderer)
+    pictures.save(pictures.off_screen((1500, 750), renderers), path)
 
 
 def frame_of(patch):
@@ -102,24 +94,28 @@ def frame_of(patch):
     return centre, normal, across, numpy.linalg.norm(points - centre, axis=1).max()
 
 
-def draw_mesh(blocks, path):
-    mesh = blocks["internalMesh"]
+def along_inlet(blocks, reach):
+    """A plane along the vessel at the inlet, its normal, the direction into the vessel, the inlet's radius, and a place so many radii inside."""
     centre, normal, across, radius = frame_of(blocks["inlet"])
-    inside = numpy.array(mesh.GetCenter()) - centre
-    middle = centre + 4.0 * radius * normal * numpy.sign(inside.dot(normal))
+    inwards = normal * numpy.sign((numpy.array(blocks["internalMesh"].GetCenter()) - centre).dot(normal))
     plane = vtkPlane()
     plane.SetOrigin(*centre)
     plane.SetNormal(*across)
+    return plane, across, inwards, radius, centre + reach * radius * inwards
+
+
+def draw_mesh(blocks, path):
+    plane, across, inwards, radius, middle = along_inlet(blocks, 4.0)
     cut = vtkExtractGeometry()
-    cut.SetInputData(mesh)
+    cut.SetInputData(blocks["internalMesh"])
     cut.SetImplicitFunction(plane)
     cut.ExtractInsideOn()
     cut.ExtractBoundaryCellsOff()
     surface = vtkDataSetSurfaceFilter()
     surface.SetInputConnection(cut.GetOutputPort())
     surface.Update()
-    picture(path, [([actor_of(surface.GetOutput())[0]], middle, across, normal, 4.2 * radius),
-                   ([actor_of(blocks["inlet"])[0]], centre, normal * -numpy.sign(inside.dot(normal)), across, 1.1 * radius)])
+    picture(path, [([actor_of(surface.GetOutput())[0]], middle, across, inwards, 4.2 * radius),
+                   ([actor_of(blocks["inlet"])[0]], plane.GetOrigin(), -inwards, across, 1.1 * radius)])
 
 
 def bar_of(mapper, title):
@@ -165,10 +161,7 @@ def draw_speed(blocks, path):
     if velocity is None or velocity.GetNumberOfTuples() != mesh.GetNumberOfCells():
         return
     add(mesh, "m/s", numpy.linalg.norm(vtk_to_numpy(velocity), axis=1))
-    centre, normal, across, radius = frame_of(blocks["inlet"])
-    plane = vtkPlane()
-    plane.SetOrigin(*centre)
-    plane.SetNormal(*across)
+    plane, across, inwards, radius, middle = along_inlet(blocks, 6.0)
     cut = vtkCutter()
     cut.SetInputData(mesh)
     cut.SetCutFunction(plane)
@@ -178,9 +171,7 @@ def draw_speed(blocks, path):
     if values.max() <= 0.0:
         return
     actor, mapper = actor_of(section, edges=False, array="m/s", limits=(0.0, values.max()))
-    inside = numpy.array(mesh.GetCenter()) - centre
-    middle = centre + 6.0 * radius * normal * numpy.sign(inside.dot(normal))
-    picture(path, [([actor], middle, across, normal, 6.5 * radius)], bar_of(mapper, "speed, m/s"))
+    picture(path, [([actor], middle, across, inwards, 6.5 * radius)], bar_of(mapper, "speed, m/s"))
 
 
 def main():
