@@ -344,7 +344,9 @@ std::string Readme(const FoamCase& flow)
     text += "    sh Allcheck          # the mesh over a cycle\n";
   }
   text += "    sh Allrun            # " +
-    std::string(flow.steady ? "steady flow" : "the flow, again from where it was stopped") +
+    std::string(flow.steady ? "steady flow"
+        : flow.moving       ? "the flow; once begun, it can only begin anew"
+                            : "the flow, again from where it was stopped") +
     "\n\nIn ParaView open `case.foam`. `postProcessing` has flow (m^3/s, out of the mesh) and "
     "pressure of each end.\n";
   if (!flow.steady)
@@ -366,12 +368,20 @@ std::string Readme(const FoamCase& flow)
 
 std::string RunScript(const FoamCase& flow)
 {
-  std::string text =
-    "#!/bin/sh\n# Runs the case, on from its latest time.\nset -e\ncd \"$(dirname \"$0\")\"\n" +
-    Environment;
+  std::string text = "#!/bin/sh\n# Runs the case" +
+    std::string(flow.moving ? "" : ", on from its latest time") +
+    ".\nset -e\ncd \"$(dirname \"$0\")\"\n" + Environment;
   if (flow.moving)
   {
-    text += "# The later cycles are as the first.\n"
+    text += "for time in 0.[0-9]* [1-9]*; do\n"
+            "  if [ -e \"$time\" ]; then\n"
+            "    echo \"Allrun: there are results of $time s, and OpenFOAM 1912 does not read "
+            "moving walls\" \\\n"
+            "      \"that it wrote: without these folders and postProcessing it begins anew\" >&2\n"
+            "    exit 1\n"
+            "  fi\n"
+            "done\n"
+            "# The later cycles are as the first.\n"
             "for patch in constant/boundaryData/*; do\n"
             "  for now in \"$patch\"/[0-9]*; do\n"
             "    [ -L \"$now\" ] && continue\n"

@@ -1,4 +1,5 @@
 """Reads meshes and fields of OpenFOAM's text files, as far as the project's own cases need it."""
+import glob
 import os
 import re
 
@@ -103,11 +104,11 @@ def patch_field(case, time, name, patch, columns):
 
 
 def series(case, name):
-    """Times and values that a function object wrote at every step; of several starts one behind the other."""
-    folder = os.path.join(case, "postProcessing", name)
+    """Times and values that a function object wrote at every step. Of several starts, also from one time, the last one counts."""
+    files = glob.glob(os.path.join(glob.escape(case), "postProcessing", name, "*", "surfaceFieldValue*.dat"))
     rows = {}
-    for start in sorted(os.listdir(folder), key=float):
-        with open(os.path.join(folder, start, "surfaceFieldValue.dat"), encoding="utf-8") as file:
+    for path in sorted(files, key=os.path.getmtime):
+        with open(path, encoding="utf-8") as file:
             for line in file:
                 if not line.startswith("#"):
                     words = line.split()
