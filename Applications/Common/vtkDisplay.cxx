@@ -9,13 +9,8 @@
 
 namespace coronary
 {
-bool CanDraw(std::string& why)
+bool HasDisplay(std::string& why)
 {
-  vtkNew<vtkRenderWindow> window;
-  if (!window->IsA("vtkXOpenGLRenderWindow"))
-  {
-    return true;
-  }
   void* library = dlopen("libX11.so.6", RTLD_NOW | RTLD_LOCAL);
   if (!library)
   {
@@ -65,5 +60,11 @@ bool CanDraw(std::string& why)
   }
   // The library stays: VTK uses it too.
   return there;
+}
+
+bool CanDraw(std::string& why)
+{
+  vtkNew<vtkRenderWindow> window;
+  return !window->IsA("vtkXOpenGLRenderWindow") || HasDisplay(why);
 }
 }

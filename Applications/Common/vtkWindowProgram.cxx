@@ -35,7 +35,7 @@ void RequireOpenGL()
 void RequireDisplay()
 {
   std::string why;
-  if (!CanDraw(why))
+  if (!HasDisplay(why))
   {
     throw std::runtime_error("There is no display for the window (" + why +
       "); without one the program runs with --headless.");

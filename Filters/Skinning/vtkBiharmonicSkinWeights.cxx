@@ -48,9 +48,10 @@ void ReadMesh(vtkUnstructuredGrid* mesh, SkinWeightInput& input)
   vtkNew<vtkIdList> corners;
   for (vtkIdType c = 0; c < mesh->GetNumberOfCells(); ++c)
   {
-    vtkCoronary::Require(mesh->GetCellType(c) == VTK_TETRA,
-      "Cell " + std::to_string(c) + " of the mesh is no tetrahedron");
     mesh->GetCellPoints(c, corners);
+    // Both: a cell that is added to cells of one type counts as that type from VTK 9.6 on, whatever its corners.
+    vtkCoronary::Require(mesh->GetCellType(c) == VTK_TETRA && corners->GetNumberOfIds() == 4,
+      "Cell " + std::to_string(c) + " of the mesh is no tetrahedron");
     std::copy(corners->begin(), corners->end(), input.tetrahedra[c].begin());
   }
 }

@@ -5,6 +5,8 @@ set -euo pipefail
 script="$(cd "$(dirname "$0")/../.." && pwd)/scripts/install-dependencies.sh"
 work="$(mktemp -d)"
 trap 'rm -rf "$work"' EXIT
+# Where this runs they may well go together, as on unstable.
+export DYNAMICCORONARY_SUITE=bookworm
 cat >"$work/dpkg-query" <<'EOF'
 #!/bin/sh
 for package; do :; done
