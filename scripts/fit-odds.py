@@ -32,12 +32,12 @@ BEFORE = {
     "links": {"outgrows": (-8.0, 1.0), "abrupt": (1.5, 1.0), "brighter": (-6.0, 1.0)},
     "tips": {},
     # What is known of the signs without images: of 13 phantoms and 54 scanned series, before there were others. Signs of the images are
-    # small numbers with large weights. No heart that is fitted to has a wrong ostium: the limit alone tells.
+    # small numbers with large weights. No heart that is fitted to has a wrong ostium, few have a vein: the limits alone tell.
     "placements": {"unclear": (-2.4, 10.0), "seldom": (-5.42, 10.0), "swept": (-1.29, 10.0), "unseen": (-1.72, 10.0),
-                   "(intercept)": (6.02, 10.0), "(signs)": (0.0, 0.04), "doubtful": (0.0, 1e9)},
+                   "(intercept)": (6.02, 10.0), "(signs)": (0.0, 0.04), "doubtful": (0.0, 1e9), "vein": (0.0, 1e9)},
 }
 # Where one of these signs is above its limit, no more is said than a coin's throw, whatever the weights: as BranchPlacement.cxx does.
-LIMITED = {"placements": {"unseen": 0.5, "seldom": 0.5, "beside": 0.7, "strays": 0.7, "doubtful": 0.3}}
+LIMITED = {"placements": {"unseen": 0.5, "seldom": 0.5, "beside": 0.7, "strays": 0.7, "doubtful": 0.3, "vein": 0.05}}
 # All of their signs speak against: a weight that would be positive is 0.
 AGAINST = {"placements"}
 

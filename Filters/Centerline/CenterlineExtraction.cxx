@@ -16,6 +16,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -56,10 +57,11 @@ public:
 
   CenterlineResult Run();
 
-  /// After Run: branches of its tree that are veins are added to the excluded voxels, and to what was rejected.
-  /// @returns whether there is one
-  bool ExcludeVeins(ExcludedVoxels& excluded, std::vector<RejectedVein>& veins,
-    std::vector<VeinBranch>& judged) const;
+  /// What JudgeBranches says of the tree that Run made.
+  std::vector<VeinBranch> JudgeVeins() const;
+
+  /// mm, edge
+  double Voxel() const { return this->Paths.voxel; }
 
 private:
   /// In the coordinates that the input was given in.
@@ -604,32 +606,14 @@ bool Extractor::ThinBranchesFor(ThinBranchSettings& settings)
   return true;
 }
 
-/// @param excluded  may be what this one was made with: it is read before it is changed
-bool Extractor::ExcludeVeins(
-  ExcludedVoxels& excluded, std::vector<RejectedVein>& veins, std::vector<VeinBranch>& judged) const
+std::vector<VeinBranch> Extractor::JudgeVeins() const
 {
   if (!this->Input.intensity || !this->Calibrated)
   {
-    return false;
+    return {};
   }
-  const VesselTree& tree = this->Result.tree;
-  std::vector<VeinBranch> found;
-  const auto closedBefore = [&](const Vector3& point) { return this->Excluded.Contains(point); };
-  for (VeinBranch& branch :
-    JudgeBranches(tree, *this->Paths.image, this->Paths.lumen.reference, this->Blur, closedBefore))
-  {
-    if (branch.probability >= 0.5)
-    {
-      found.push_back(branch);
-    }
-    judged.push_back(std::move(branch));
-  }
-  if (found.empty())
-  {
-    return false;
-  }
-  excluded.Close(found, tree, this->Paths.voxel, veins);
-  return true;
+  return JudgeBranches(this->Result.tree, *this->Paths.image, this->Paths.lumen.reference,
+    this->Blur, [this](const Vector3& point) { return this->Excluded.Contains(point); });
 }
 
 /// What is too thin for the region, by the image alone.
@@ -1061,14 +1045,21 @@ CenterlineResult ExtractCenterlines(const CenterlineInput& input,
   std::vector<VeinBranch> judged;
   CenterlineResult result;
   constexpr int rounds = 6;
-  for (int round = 0; round <= rounds; ++round)
+  for (int round = 0;; ++round)
   {
     Extractor extractor(framed, input, excluded, settings, progress);
     result = extractor.Run();
-    if (round == rounds || !extractor.ExcludeVeins(excluded, veins, judged))
+    const std::vector<VeinBranch> branches = extractor.JudgeVeins();
+    judged.insert(judged.end(), branches.begin(), branches.end());
+    std::vector<VeinBranch> found;
+    std::copy_if(branches.begin(), branches.end(), std::back_inserter(found),
+      [](const VeinBranch& branch) { return branch.probability >= 0.5; });
+    if (round == rounds || found.empty())
     {
+      result.veinProbability = VeinProbabilityOfPoints(result.tree, branches);
       break;
     }
+    excluded.Close(found, result.tree, extractor.Voxel(), veins);
   }
   const auto toWorld = [&](Vector3& point)
   { point = origin + input.grid.direction * Vector3(point); };

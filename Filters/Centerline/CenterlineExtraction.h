@@ -112,6 +112,8 @@ struct CenterlineResult
   std::vector<CenterlineEnd> targets; ///< one for each target
   std::vector<CenterlineBifurcation> bifurcations;
   std::vector<RejectedVein> veins;
+  /// Of each point of the tree, 0 to 1: the greatest of the branches from the ostium to its own one; 0 where none was judged.
+  std::vector<double> veinProbability;
   std::vector<VeinBranch>
     judged; ///< in all rounds: what the weights of VeinRejection.h are fitted to
   std::vector<std::string> messages; ///< what a user should know

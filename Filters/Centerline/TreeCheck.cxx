@@ -1,5 +1,6 @@
 #include "TreeCheck.h"
 
+#include "CoronaryAnatomy.h"
 #include "SegmentAtlas.h"
 #include "TreeLinks.h"
 #include "VesselTips.h"
@@ -10,6 +11,7 @@
 #include <cstdio>
 #include <initializer_list>
 #include <limits>
+#include <map>
 
 namespace coronary
 {
@@ -94,7 +96,8 @@ double Sure(double excess, double scale)
 class Checker
 {
 public:
-  Checker(const CenterlineTopology& tree, const LabelingResult& labels);
+  Checker(
+    const CenterlineTopology& tree, const LabelingResult& labels, const std::vector<double>& vein);
   std::vector<TreeWarning> Run();
 
 private:
@@ -115,10 +118,12 @@ private:
   void BackOfTheHeart();
   void Tips();
   void Territories();
+  void Veins();
   std::string NameOf(std::size_t branch) const;
 
   const CenterlineTopology& Tree;
   const LabelingResult& Labels;
+  const std::vector<double>& Vein;
   const SegmentAtlas& Atlas;
   Matrix3 Inverse;
   double Trust = 1.0; ///< in the fit
@@ -126,9 +131,11 @@ private:
   std::vector<TreeWarning> Warnings;
 };
 
-Checker::Checker(const CenterlineTopology& tree, const LabelingResult& labels)
+Checker::Checker(
+  const CenterlineTopology& tree, const LabelingResult& labels, const std::vector<double>& vein)
   : Tree(tree)
   , Labels(labels)
+  , Vein(vein)
   , Atlas(SegmentAtlas::Get())
   , Inverse(labels.fit.matrix.inverse())
 {
@@ -478,6 +485,48 @@ void Checker::Territories()
   }
 }
 
+/// Branches that were kept and may be veins; what hangs on one is told with it.
+void Checker::Veins()
+{
+  struct Doubt
+  {
+    const VesselTree::Branch* first;
+    double length, probability;
+  };
+  constexpr double possible = 0.1;
+  std::vector<Doubt> doubts;
+  std::map<int, std::size_t> doubtOf; // of a group
+  for (const VesselTree::Branch& branch : this->Tree.branches)
+  {
+    // The first point is the parent's.
+    double probability = 0.0;
+    for (std::size_t i = 1; i < branch.points.size(); ++i)
+    {
+      probability = std::max(probability, this->Vein[branch.points[i]]);
+    }
+    if (probability <= possible)
+    {
+      continue;
+    }
+    const auto parent = doubtOf.find(branch.parentGroupId);
+    const std::size_t own = parent == doubtOf.end() ? doubts.size() : parent->second;
+    if (own == doubts.size())
+    {
+      doubts.push_back({ &branch, 0.0, probability });
+    }
+    doubts[own].length += branch.length;
+    doubtOf[branch.groupId] = own;
+  }
+  for (const Doubt& doubt : doubts)
+  {
+    const std::string vessel = SegmentName(doubt.first->segmentId);
+    const Vector3& place = this->Tree.points[doubt.first->points[1]];
+    this->Warn((vessel.empty() ? "a branch" : vessel) + " may be a vein: " + Rounded(doubt.length) +
+        " mm from " + At(place) + " on",
+      vessel, place, doubt.probability);
+  }
+}
+
 std::vector<TreeWarning> Checker::Run()
 {
   if (this->Trees())
@@ -489,6 +538,10 @@ std::vector<TreeWarning> Checker::Run()
     this->BackOfTheHeart();
     this->Territories();
     this->Tips();
+  }
+  if (!this->Vein.empty())
+  {
+    this->Veins();
   }
   return this->Warnings;
 }
@@ -508,7 +561,7 @@ std::optional<TreeWarning> DoubtfulVeinWarning(const Vector3& place, double leng
 }
 
 std::vector<TreeWarning> CheckCoronaryTrees(
-  const CenterlineTopology& tree, const LabelingResult& labels)
+  const CenterlineTopology& tree, const LabelingResult& labels, const std::vector<double>& vein)
 {
   if (tree.branches.empty())
   {
@@ -518,7 +571,7 @@ std::vector<TreeWarning> CheckCoronaryTrees(
   const double unit = std::pow(10.0, std::round(std::log10(labels.heart.size)));
   if (unit == 1.0)
   {
-    return Checker(tree, labels).Run();
+    return Checker(tree, labels, vein).Run();
   }
   CenterlineTopology scaled = tree;
   for (std::size_t i = 0; i < tree.points.size(); ++i)
@@ -534,7 +587,7 @@ std::vector<TreeWarning> CheckCoronaryTrees(
   LabelingResult inMillimetres = labels;
   inMillimetres.fit.matrix *= unit;
   inMillimetres.heart.size /= unit;
-  std::vector<TreeWarning> warnings = Checker(scaled, inMillimetres).Run();
+  std::vector<TreeWarning> warnings = Checker(scaled, inMillimetres, vein).Run();
   for (TreeWarning& warning : warnings)
   {
     warning.place *= unit;

@@ -31,9 +31,10 @@ struct TreeWarning
  * What is not as it is in whole, healthy trees; empty when all is well, or there are no branches.
  * @param tree    named by LabelSegments(), in any unit of length; the sentences are in mm
  * @param labels  its result for that tree
+ * @param vein    of each point, 0 to 1: that it hangs on a vein; empty: not known
  */
-std::vector<TreeWarning> CheckCoronaryTrees(
-  const CenterlineTopology& tree, const LabelingResult& labels);
+std::vector<TreeWarning> CheckCoronaryTrees(const CenterlineTopology& tree,
+  const LabelingResult& labels, const std::vector<double>& vein = {});
 
 /**
  * To be said of what was left out as a vein unless that is certain; none when it is.

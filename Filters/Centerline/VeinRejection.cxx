@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 #include <set>
 #include <utility>
@@ -914,5 +915,28 @@ std::vector<VeinBranch> JudgeBranches(const VesselTree& tree, const ImageInterpo
   const LumenReference& reference, double blur, const std::function<bool(const Vector3&)>& closed)
 {
   return VeinFinder(tree, image, reference, blur, closed).Run();
+}
+
+std::vector<double> VeinProbabilityOfPoints(
+  const VesselTree& tree, const std::vector<VeinBranch>& judged)
+{
+  std::map<int, double> ofGroup;
+  for (const VeinBranch& branch : judged)
+  {
+    ofGroup[branch.groupId] = branch.probability;
+  }
+  std::vector<double> result(tree.points.size(), 0.0);
+  // A parent stands before its daughters.
+  for (const VesselTree::Branch& branch : tree.branches)
+  {
+    double& own = ofGroup[branch.groupId];
+    own = branch.parentGroupId < 0 ? own : std::max(own, ofGroup[branch.parentGroupId]);
+    // The first point is the parent's.
+    for (std::size_t i = branch.parentGroupId < 0 ? 0 : 1; i < branch.points.size(); ++i)
+    {
+      result[static_cast<std::size_t>(branch.points[i])] = own;
+    }
+  }
+  return result;
 }
 }

@@ -47,6 +47,11 @@ struct VeinBranch
 std::vector<VeinBranch> JudgeBranches(const VesselTree& tree, const ImageInterpolator& image,
   const LumenReference& reference, double blur,
   const std::function<bool(const Vector3&)>& closed = {});
+
+/// @param judged  of this tree
+/// @returns of each point, 0 to 1: the greatest of the branches from the root to its own one, for what hangs on a vein is one
+std::vector<double> VeinProbabilityOfPoints(
+  const VesselTree& tree, const std::vector<VeinBranch>& judged);
 }
 
 #endif

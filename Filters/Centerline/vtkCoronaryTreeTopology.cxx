@@ -123,8 +123,7 @@ int vtkCoronaryTreeTopology::RequestData(
     writer.WriteFieldData(output[BifurcationPort], named);
     if (named != nullptr)
     {
-      const std::vector<coronary::TreeWarning> warnings =
-        coronary::CheckCoronaryTrees(tree, labels);
+      const std::vector<coronary::TreeWarning> warnings = writer.Warnings(labels);
       writer.WriteWarnings(output[TreePort], warnings);
       writer.WriteWarnings(output[BifurcationPort], warnings);
     }

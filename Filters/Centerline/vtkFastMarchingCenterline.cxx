@@ -163,6 +163,8 @@ void FillTree(
     }
   }
   vtkCoronary::AddArray<vtkDoubleArray>(output->GetPointData(), names::OstiumConfidence, ostium);
+  vtkCoronary::AddArray<vtkDoubleArray>(
+    output->GetPointData(), names::VeinProbability, result.veinProbability);
   vtkNew<vtkDoubleArray> veinPositions;
   veinPositions->SetName(names::VeinPositions);
   veinPositions->SetNumberOfComponents(3);

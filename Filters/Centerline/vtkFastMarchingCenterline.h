@@ -30,7 +30,7 @@
  *   root), `Confidence` (double, 0 a guess to 1 clearly seen), `Bridged` (unsigned char, 1: guessed on a
  *   way across a lesion that the mask's field data describe), `BridgeConfidence` (double, 0 to 1: that what
  *   is behind such ways belongs to the tree; 1 before the first), `OstiumConfidence` (double, 0 to 1: the seed's
- *   `Confidence`, else 1). Cell data `GroupIds`,
+ *   `Confidence`, else 1), `VeinProbability` (double, 0 to 1: that it, or what it hangs on, is a vein; from the image). Cell data `GroupIds`,
  *   `ParentGroupIds` (-1 at a root), `TreeIds` (index of the seed; all int), `Length` (double, mm),
  *   `Tortuosity` (double, length / chord - 1). Field data `VeinPositions` (double[3], mm), `VeinLengths`
  *   (double, mm), `VeinProbabilities` (double): what touched the trees, was taken for a vein, and left out.

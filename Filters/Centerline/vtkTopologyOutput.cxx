@@ -175,6 +175,19 @@ void TopologyOutput::WriteLoops(vtkPolyData* output) const
     output->GetCellData(), vtkCoronaryArrayNames::Length, lengths);
 }
 
+std::vector<coronary::TreeWarning> TopologyOutput::Warnings(
+  const coronary::LabelingResult& labels) const
+{
+  std::vector<double> vein;
+  vtkDataArray* given =
+    this->Input->GetPointData()->GetArray(vtkCoronaryArrayNames::VeinProbability);
+  for (std::size_t i = 0; given && i < this->Tree.source.size(); ++i)
+  {
+    vein.push_back(given->GetComponent(this->Tree.source[i], 0));
+  }
+  return coronary::CheckCoronaryTrees(this->Tree, labels, vein);
+}
+
 void TopologyOutput::WriteWarnings(
   vtkPolyData* output, const std::vector<coronary::TreeWarning>& warnings) const
 {

@@ -27,6 +27,8 @@ public:
   void WriteTree(vtkPolyData* output) const;
   void WriteBifurcations(vtkPolyData* output) const;
   void WriteLoops(vtkPolyData* output) const;
+  /// What checks say of the tree, and which of its branches the input's `VeinProbability` doubts.
+  std::vector<coronary::TreeWarning> Warnings(const coronary::LabelingResult& labels) const;
   void WriteWarnings(vtkPolyData* output, const std::vector<coronary::TreeWarning>& warnings) const;
   /// @param labels  null: no names were looked for
   void WriteFieldData(vtkPolyData* output, const coronary::LabelingResult* labels) const;

@@ -168,7 +168,7 @@ vtkSmartPointer<vtkPolyData> PointsOf(vtkPolyData* given, const coronary::Edited
   replace(names::Confidence, edited.tree.confidence);
   replace(names::Bridged, edited.tree.bridged);
   replace(names::BridgeConfidence, edited.tree.bridgeConfidence);
-  // What was drawn by hand hangs on no ostium that was guessed.
+  // What was drawn by hand hangs on no ostium that was guessed, and is no vein: NullData has 0.
   vtkDataArray* ostium = to->GetArray(names::OstiumConfidence);
   for (std::size_t p = 0; ostium && p < edited.source.size(); ++p)
   {
@@ -417,7 +417,7 @@ void vtkVesselEdits::EditPolyData(vtkPolyData* input, vtkInformationVector** inp
   writer.WriteFieldData(output, labels);
   if (labels)
   {
-    writer.WriteWarnings(output, coronary::CheckCoronaryTrees(made.tree, *labels));
+    writer.WriteWarnings(output, writer.Warnings(*labels));
   }
 }
 

@@ -46,6 +46,8 @@ constexpr const char* BridgeConfidence =
   "BridgeConfidence"; ///< double, 0 to 1, 1 before any bridge
 constexpr const char* OstiumConfidence =
   "OstiumConfidence"; ///< double, 0 to 1, of the seed that the point hangs on
+constexpr const char* VeinProbability =
+  "VeinProbability"; ///< double, 0 to 1, that what the point hangs on is a vein
 constexpr const char* Radius = "MaximumInscribedSphereRadius"; ///< double, mm
 constexpr const char* Abscissas = "Abscissas";       ///< double, mm from the root along the tree
 constexpr const char* SegmentIds = "SegmentIds";     ///< int, coronary::SegmentId

@@ -15,8 +15,8 @@ namespace
 // scripts/validate-placement.py --fit, with the scans of scripts/validate-scanned.py. What the images show had no part in that
 // yet: its signs limit what is said, and have no weights.
 constexpr double Intercept = 6.02;
-constexpr std::array<double, PlacementSigns::Count> Weights = { -2.40, -5.42, -1.29, 0.0, -1.72,
-  0.0, 0.0, 0.0 };
+constexpr std::array<double, PlacementSigns::Count> Weights = { -2.40, -5.42, -1.29, 0.0, 0.0,
+  -1.72, 0.0, 0.0, 0.0 };
 constexpr double UsualDim = 0.2; ///< between two phases, by motion
 
 /// What is mostly unseen, or beside where the images have the lumen, is less likely than a coin's throw, whatever else speaks for it.
@@ -24,6 +24,8 @@ constexpr double MaximumUnseen = 0.5;
 constexpr double UnlikelyConfidence = 0.5;
 /// Of an ostium: wrong ones have less than 0.7 (docs/validation.md), right ones hardly ever.
 constexpr double MaximumDoubt = 0.3;
+/// Of veins that were kept in trees 17 of 18 have more, and one artery in fifty (docs/validation.md).
+constexpr double MaximumVein = 0.05;
 
 /// Mean of what is known of a line's points; nothing: 1.
 double MeanOf(const std::vector<double>& values, const std::vector<std::int64_t>& line)
@@ -34,6 +36,17 @@ double MeanOf(const std::vector<double>& values, const std::vector<std::int64_t>
     sum += values.empty() ? 1.0 : values[p];
   }
   return sum / static_cast<double>(line.size());
+}
+
+/// Greatest of what is known of a line's points but the first, which its parent has too; nothing: 0.
+double GreatestOf(const std::vector<double>& values, const std::vector<std::int64_t>& line)
+{
+  double greatest = 0.0;
+  for (std::size_t i = 1; i < line.size() && !values.empty(); ++i)
+  {
+    greatest = std::max(greatest, values[line[i]]);
+  }
+  return greatest;
 }
 
 double UnseenShare(const std::vector<TrackingStatus>& status, const std::vector<std::int64_t>& line)
@@ -100,14 +113,14 @@ std::vector<double> WeightsOfPhases(const PoseSequence& poses, double reference)
 const std::array<std::string, PlacementSigns::Count>& PlacementSigns::Names()
 {
   static const std::array<std::string, Count> names{ "unclear", "seldom", "swept", "doubtful",
-    "unseen", "beside", "dim", "strays" };
+    "vein", "unseen", "beside", "dim", "strays" };
   return names;
 }
 
 std::array<double, PlacementSigns::Count> PlacementSigns::Values() const
 {
-  return { this->unclear, this->seldom, this->swept, this->doubtful, this->unseen, this->beside,
-    this->dim, this->strays };
+  return { this->unclear, this->seldom, this->swept, this->doubtful, this->vein, this->unseen,
+    this->beside, this->dim, this->strays };
 }
 
 std::vector<std::vector<PlacementSigns>> SignsOfPlacement(const Polylines& rest,
@@ -121,6 +134,7 @@ std::vector<std::vector<PlacementSigns>> SignsOfPlacement(const Polylines& rest,
   const char* const others = "the lines have other points";
   require(evidence.certainty.empty() || fits(evidence.certainty), others);
   require(evidence.ostium.empty() || fits(evidence.ostium), others);
+  require(evidence.vein.empty() || fits(evidence.vein), others);
   require(evidence.sights.empty() || evidence.sights.size() == phases,
     "what the images show is of other phases");
   for (std::size_t k = 0; k < phases; ++k)
@@ -140,6 +154,7 @@ std::vector<std::vector<PlacementSigns>> SignsOfPlacement(const Polylines& rest,
     PlacementSigns signs;
     signs.unclear = 1.0 - MeanOf(evidence.certainty, line);
     signs.doubtful = 1.0 - MeanOf(evidence.ostium, line);
+    signs.vein = GreatestOf(evidence.vein, line);
     signs.swept = timing.window * Range(line, poses);
     double brightest = 0.0;
     double strays = 0.0;
@@ -181,7 +196,7 @@ double PlacementConfidence(const PlacementSigns& signs)
   const double chance = 1.0 / (1.0 + std::exp(-odds));
   const bool unlikely = std::max(signs.unseen, signs.seldom) > MaximumUnseen ||
     std::max(signs.beside, signs.strays) > PlacedWithin - UsualBeside ||
-    signs.doubtful > MaximumDoubt;
+    signs.doubtful > MaximumDoubt || signs.vein > MaximumVein;
   return unlikely ? std::min(chance, UnlikelyConfidence) : chance;
 }
 

@@ -37,13 +37,14 @@ struct PlacementEvidence
 {
   std::vector<double> certainty;  ///< per point, 0 to 1, that its section is that of a vessel
   std::vector<double> ostium;     ///< per point, 0 to 1: confidence of the ostium that it hangs on
+  std::vector<double> vein;       ///< per point, 0 to 1: probability that it hangs on a vein
   std::vector<LumenSight> sights; ///< per phase, in its image
 };
 
 /// What tells whether one branch is where it is said to be at one phase. All speak against it.
 struct PlacementSigns
 {
-  static constexpr std::size_t Count = 8;
+  static constexpr std::size_t Count = 9;
   static const std::array<std::string, Count>& Names();
 
   // Of the branch.
@@ -54,6 +55,7 @@ struct PlacementSigns
   double swept =
     0.0; ///< mm that it moves while an image is taken, at the mean speed of its motion to and fro
   double doubtful = 0.0; ///< 1 less the confidence of its ostium
+  double vein = 0.0;     ///< probability that it is one
   // Of the phase.
   double unseen = 0.0; ///< share of its points that were filled or lost
   // Of what the images show there; 0 where none was looked at.
@@ -75,7 +77,7 @@ std::vector<std::vector<PlacementSigns>> SignsOfPlacement(const Polylines& rest,
   const PlacementEvidence& evidence, const PoseSequence& poses, const ImageTiming& timing);
 
 /// Probability that a branch with these signs is within PlacedWithin of an artery. Of what is mostly unseen or farther than that
-/// from the lumens that the images have, at the phase or over all of them, or hangs on a doubtful ostium, 0.5 at most.
+/// from the lumens that the images have, at the phase or over all of them, hangs on a doubtful ostium, or may be a vein, 0.5 at most.
 double PlacementConfidence(const PlacementSigns& signs);
 
 /// Probability that a place is within PlacedWithin of where it is said to be, when all that is known is how far off such places

@@ -18,7 +18,7 @@
  *   the lines of every phase with radii, as found in it by whatever means. Neither need the same points nor
  *   the same branches at all phases.
  * - 1: vtkPolyData, lines to track, at the reference phase. Point data `MaximumInscribedSphereRadius` or `Radius`,
- *   `Confidence`, `OstiumConfidence` (all optional). Field data `PhaseTime` (optional): the reference phase.
+ *   `Confidence`, `OstiumConfidence`, `VeinProbability` (all optional). Field data `PhaseTime` (optional): the reference phase.
  * - 2, optional: vtkPolyData, a skeleton made of the same lines, of which the second output is made.
  *
  * @par Output ports:

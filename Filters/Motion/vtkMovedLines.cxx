@@ -99,11 +99,16 @@ coronary::PlacementEvidence EvidenceOf(vtkPolyData* lines)
   vtkCoronary::AddPointValues(lines, values);
   coronary::PlacementEvidence evidence;
   evidence.certainty = std::move(values.confidence);
-  vtkDataArray* ostium = lines->GetPointData()->GetArray(names::OstiumConfidence);
-  for (vtkIdType n = 0; ostium && n < ostium->GetNumberOfTuples(); ++n)
+  const auto read = [lines](const char* name, std::vector<double>& list)
   {
-    evidence.ostium.push_back(ostium->GetComponent(n, 0));
-  }
+    vtkDataArray* array = lines->GetPointData()->GetArray(name);
+    for (vtkIdType n = 0; array && n < array->GetNumberOfTuples(); ++n)
+    {
+      list.push_back(array->GetComponent(n, 0));
+    }
+  };
+  read(names::OstiumConfidence, evidence.ostium);
+  read(names::VeinProbability, evidence.vein);
   return evidence;
 }
 

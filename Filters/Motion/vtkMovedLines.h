@@ -36,7 +36,7 @@ std::size_t NearestIndex(const std::vector<double>& times, double wanted);
 /// TIME_STEPS and TIME_RANGE of all outputs; without times none.
 void SetTimes(vtkInformationVector* outputs, const std::vector<double>& times);
 
-/// How sure a tree is of its sections and ostia, as its point arrays `Confidence` and `OstiumConfidence` tell.
+/// How sure a tree is of its sections, its ostia, and that it is no vein, as its point arrays `Confidence`, `OstiumConfidence` and `VeinProbability` tell.
 coronary::PlacementEvidence EvidenceOf(vtkPolyData* lines);
 
 /// Where the points of a skeleton are nearest to the lines that it was made of.

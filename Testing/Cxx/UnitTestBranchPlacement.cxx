@@ -77,7 +77,7 @@ TEST(BranchPlacement, SignsOfWhatIsNot)
     point[2] += 3.0;
   }
   const std::vector<PlacementSigns> signs =
-    SignsOfPlacement(lines, { certainty, {}, {} }, poses, { 0.5, 0.1 })[0];
+    SignsOfPlacement(lines, { certainty, {}, {}, {} }, poses, { 0.5, 0.1 })[0];
   EXPECT_NEAR(signs[1].unseen, 10.0 / 21.0, 1e-12);
   EXPECT_NEAR(signs[1].unclear, 0.5 * 10.0 / 21.0, 1e-12);
   EXPECT_NEAR(signs[1].seldom, 31.0 / (31.0 + 41.0) * 10.0 / 21.0, 1e-12);
@@ -142,6 +142,24 @@ TEST(BranchPlacement, WhatHangsOnADoubtfulOstiumIsNeverConfident)
   }
 }
 
+TEST(BranchPlacement, WhatMayBeAVeinIsNeverConfident)
+{
+  const Polylines lines = TwoLines();
+  PlacementEvidence evidence;
+  evidence.vein.assign(lines.points.size(), 0.0);
+  std::fill(evidence.vein.begin() + 21, evidence.vein.end(), 0.04);
+  EXPECT_GT(PlacementConfidences(lines, evidence, AtRest(lines), { 0.5, 0.1 })[0][40], 0.9);
+  // A part of the second line is enough; the first one, which it leaves, has nothing to do with it.
+  std::fill(evidence.vein.begin() + 35, evidence.vein.end(), 0.06);
+  const auto said = PlacementConfidences(lines, evidence, AtRest(lines), { 0.5, 0.1 });
+  EXPECT_GT(said[0][0], 0.9);
+  EXPECT_LE(said[0][25], 0.5);
+  EXPECT_EQ(SignsOfPlacement(lines, evidence, AtRest(lines), { 0.5, 0.1 })[0][1].vein, 0.06);
+  evidence.vein.pop_back();
+  EXPECT_THROW(
+    SignsOfPlacement(lines, evidence, AtRest(lines), { 0.5, 0.1 }), std::invalid_argument);
+}
+
 TEST(BranchPlacement, SignsOfWhatTheImagesShow)
 {
   const Polylines lines = TwoLines();
@@ -171,9 +189,10 @@ TEST(BranchPlacement, SignsOfWhatTheImagesShow)
 TEST(BranchPlacement, EverySignSpeaksAgainst)
 {
   using Sign = double PlacementSigns::*;
-  for (const Sign sign : { &PlacementSigns::unclear, &PlacementSigns::seldom,
-         &PlacementSigns::swept, &PlacementSigns::doubtful, &PlacementSigns::unseen,
-         &PlacementSigns::beside, &PlacementSigns::dim, &PlacementSigns::strays })
+  for (const Sign sign :
+    { &PlacementSigns::unclear, &PlacementSigns::seldom, &PlacementSigns::swept,
+      &PlacementSigns::doubtful, &PlacementSigns::vein, &PlacementSigns::unseen,
+      &PlacementSigns::beside, &PlacementSigns::dim, &PlacementSigns::strays })
   {
     double before = 1.0;
     for (const double more : { 0.0, 0.2, 0.5, 0.8, 1.0 })
@@ -238,11 +257,11 @@ TEST(BranchPlacement, RefusesOtherLines)
   poses = AtRest(lines);
   poses.status[0].pop_back();
   EXPECT_THROW(SignsOfPlacement(lines, {}, poses, { 0.5, 0.1 }), std::invalid_argument);
-  EXPECT_THROW(SignsOfPlacement(lines, { { 1.0 }, {}, {} }, AtRest(lines), { 0.5, 0.1 }),
+  EXPECT_THROW(SignsOfPlacement(lines, { { 1.0 }, {}, {}, {} }, AtRest(lines), { 0.5, 0.1 }),
     std::invalid_argument);
-  EXPECT_THROW(SignsOfPlacement(lines, { {}, { 1.0 }, {} }, AtRest(lines), { 0.5, 0.1 }),
+  EXPECT_THROW(SignsOfPlacement(lines, { {}, { 1.0 }, {}, {} }, AtRest(lines), { 0.5, 0.1 }),
     std::invalid_argument);
-  EXPECT_THROW(SignsOfPlacement(lines, { {}, {}, { {}, {} } }, AtRest(lines), { 0.5, 0.1 }),
+  EXPECT_THROW(SignsOfPlacement(lines, { {}, {}, {}, { {}, {} } }, AtRest(lines), { 0.5, 0.1 }),
     std::invalid_argument);
 }
 }

@@ -6,12 +6,14 @@
 #include "CurveSmoothing.h"
 #include "LumenMeasurement.h"
 #include "SurfaceDistance.h"
+#include "VeinRejection.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <stdexcept>
 
 using namespace coronary;
@@ -262,6 +264,26 @@ TEST(LumenMeasurement, RadiusAndCentreOfATube)
     EXPECT_NEAR(reference.background, -100.0, 60.0);
     EXPECT_NEAR(reference.lumen, 400.0, 150.0);
   }
+}
+
+TEST(VeinRejection, WhatHangsOnAVeinIsOne)
+{
+  // A trunk, two branches that leave its end, a daughter of each.
+  VesselTree tree;
+  tree.points.assign(6, Vector3::Zero());
+  tree.branches = { { { 0, 1 }, 10, -1 }, { { 1, 2 }, 11, 10 }, { { 1, 3 }, 12, 10 },
+    { { 2, 4 }, 13, 11 }, { { 3, 5 }, 14, 12 } };
+  std::vector<VeinBranch> judged;
+  for (const auto& [group, probability] :
+    std::map<int, double>{ { 11, 0.2 }, { 13, 0.1 }, { 14, 0.4 } })
+  {
+    judged.emplace_back();
+    judged.back().groupId = group;
+    judged.back().probability = probability;
+  }
+  EXPECT_EQ(
+    VeinProbabilityOfPoints(tree, judged), (std::vector<double>{ 0.0, 0.0, 0.2, 0.0, 0.2, 0.4 }));
+  EXPECT_EQ(VeinProbabilityOfPoints(tree, {}), std::vector<double>(6, 0.0));
 }
 
 TEST(LumenMeasurement, CentreBesideAVein)

@@ -6,7 +6,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
+#include <string>
 
 using namespace coronary;
 
@@ -136,6 +138,49 @@ TEST(TreeCheck, AVeinThatMayBeAnArteryIsSaid)
     "a vessel of 20 mm that touches a tree at (1.0, 2.0, 3.0) was left out as a vein, with a "
     "probability of 0.70: "
     "it may be an artery");
+}
+
+TEST(TreeCheck, AKeptBranchThatMayBeAVeinIsSaidOnce)
+{
+  for (const double unit : { 1.0, 1e-3 })
+  {
+    Cut whole = CutOff(TreeOf(331, 0), -1, 1.0);
+    for (std::size_t i = 0; i < whole.lines.points.size(); ++i)
+    {
+      whole.lines.points[i] *= unit;
+      whole.lines.radius[i] *= unit;
+    }
+    CenterlineTopology tree = BuildTopology(whole.lines);
+    const LabelingResult labels = LabelSegments(tree);
+    SplitAtSegmentBorders(tree);
+    std::vector<double> vein(tree.points.size(), 0.0);
+    EXPECT_TRUE(CheckCoronaryTrees(tree, labels, vein).empty());
+    // The circumflex, and what hangs on it.
+    std::set<int> groups;
+    double length = 0.0;
+    Vector3 begin = Vector3::Zero();
+    for (const VesselTree::Branch& branch : tree.branches)
+    {
+      if (groups.count(branch.parentGroupId) == 0 && branch.segmentId != ProximalLCx)
+      {
+        continue;
+      }
+      begin = groups.empty() ? tree.points[branch.points.front()] : begin;
+      groups.insert(branch.groupId);
+      length += branch.length / unit;
+      std::for_each(branch.points.begin() + 1, branch.points.end(),
+        [&](std::int64_t point) { vein[point] = 0.3; });
+    }
+    ASSERT_GT(groups.size(), 3u);
+    const std::vector<TreeWarning> warnings = CheckCoronaryTrees(tree, labels, vein);
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_EQ(warnings[0].vessel, "pLCx");
+    EXPECT_EQ(warnings[0].confidence, 0.3);
+    EXPECT_LT((warnings[0].place - begin).norm(), unit);
+    EXPECT_TRUE(
+      Says(warnings, "pLCx may be a vein: " + std::to_string(std::lround(length)) + " mm"))
+      << warnings[0].what;
+  }
 }
 
 TEST(TreeCheck, AVesselThatWidensIsDoubted)

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numeric>
 #include <set>
@@ -254,7 +255,10 @@ std::vector<Said> WarningsOf(const PhantomScan& scan, const FoundTree& found)
       list.push_back({ "bridge", OcclusionWarning(link, "vessel").what, "", link.points });
     }
   }
-  for (const TreeWarning& warning : CheckCoronaryTrees(found.tree, found.labels))
+  std::vector<double> vein;
+  std::transform(found.tree.source.begin(), found.tree.source.end(), std::back_inserter(vein),
+    [&](std::int64_t point) { return found.extraction.veinProbability[point]; });
+  for (const TreeWarning& warning : CheckCoronaryTrees(found.tree, found.labels, vein))
   {
     list.push_back({ "check", warning.what, warning.vessel, { warning.place } });
   }

@@ -176,7 +176,7 @@ void Judge(const std::string& run, const std::string& truth, const std::string& 
       FieldNumber(first, names::CycleLength) };
   const Polylines rest = LinesOf(found.At(timing.reference));
   PlacementEvidence evidence{ Values(first, names::Confidence),
-    Values(first, names::OstiumConfidence), {} };
+    Values(first, names::OstiumConfidence), Values(first, names::VeinProbability), {} };
   const PoseSequence poses = PosesOf(found, times, evidence.sights);
   const std::vector<std::vector<PlacementSigns>> signs =
     SignsOfPlacement(rest, evidence, poses, timing);
