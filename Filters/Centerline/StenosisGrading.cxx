@@ -438,6 +438,11 @@ void GradedPath::Describe(
   {
     lesion.degreeLow = std::min(lesion.degreeLow, std::max(0.0, 1.0 - LostRadius / healthy));
   }
+  // Nor is none told from a thin one, where the way across was not seen.
+  if (lesion.bridged && radius <= LostRadius)
+  {
+    lesion.degreeHigh = 1.0;
+  }
   if (lesion.interpolated)
   {
     lesion.degreeLow = 0.0;

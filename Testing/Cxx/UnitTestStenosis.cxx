@@ -364,25 +364,41 @@ TEST(StenosisGrading, AVesselThatIsLostInALesionSaysSo)
 
 TEST(StenosisGrading, BridgedLesionsSaySo)
 {
-  const Tube tube = Narrowed(1.6, 0.9);
-  VesselTree tree = LineWith(1.5);
-  const std::vector<VesselPath> paths = VesselPaths(tree);
-  const Measured measured = MeasureAll(tube, tree);
-  const StenosisGrading plain = GradeStenoses(tree, paths, measured.lumen);
-  tree.bridged.assign(tree.points.size(), 0);
-  tree.bridgeConfidence.assign(tree.points.size(), 1.0);
-  for (std::size_t p = 110; p < 130; ++p)
+  for (const double degree : { 0.7, 0.85 })
   {
-    tree.bridged[p] = 1;
-    tree.bridgeConfidence[p] = 0.6;
+    SCOPED_TRACE(degree);
+    const Tube tube = Narrowed(1.6, degree);
+    VesselTree tree = LineWith(1.5);
+    const std::vector<VesselPath> paths = VesselPaths(tree);
+    const Measured measured = MeasureAll(tube, tree);
+    const StenosisGrading plain = GradeStenoses(tree, paths, measured.lumen);
+    tree.bridged.assign(tree.points.size(), 0);
+    tree.bridgeConfidence.assign(tree.points.size(), 1.0);
+    for (std::size_t p = 110; p < 130; ++p)
+    {
+      tree.bridged[p] = 1;
+      tree.bridgeConfidence[p] = 0.6;
+    }
+    const StenosisGrading grading = GradeStenoses(tree, paths, measured.lumen);
+    ASSERT_EQ(grading.lesions.size(), 1U);
+    ASSERT_EQ(plain.lesions.size(), 1U);
+    const Stenosis& lesion = grading.lesions.front();
+    EXPECT_TRUE(lesion.bridged);
+    EXPECT_TRUE(lesion.kind == LesionKind::Bridged || lesion.kind == LesionKind::Occluded);
+    EXPECT_EQ(lesion.degreeLow, plain.lesions.front().degreeLow);
+    if (degree < 0.75)
+    {
+      EXPECT_EQ(lesion.degreeHigh, plain.lesions.front().degreeHigh);
+      EXPECT_NEAR(lesion.confidence, 0.6 * plain.lesions.front().confidence, 1e-9);
+    }
+    else
+    {
+      // What looks like a lumen of 0.24 mm radius may be none: the way across was not seen.
+      EXPECT_LT(plain.lesions.front().degreeHigh, 1.0);
+      EXPECT_EQ(lesion.degreeHigh, 1.0);
+      EXPECT_LT(lesion.confidence, 0.6 * plain.lesions.front().confidence);
+    }
   }
-  const StenosisGrading grading = GradeStenoses(tree, paths, measured.lumen);
-  ASSERT_EQ(grading.lesions.size(), 1U);
-  ASSERT_EQ(plain.lesions.size(), 1U);
-  EXPECT_TRUE(grading.lesions.front().bridged);
-  EXPECT_NEAR(grading.lesions.front().confidence, 0.6 * plain.lesions.front().confidence, 1e-9);
-  EXPECT_TRUE(grading.lesions.front().kind == LesionKind::Bridged ||
-    grading.lesions.front().kind == LesionKind::Occluded);
 }
 
 TEST(StenosisGrading, NoLumenIsARangeAsWell)
