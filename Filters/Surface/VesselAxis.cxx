@@ -119,7 +119,8 @@ void SolveBanded(std::vector<std::array<double, 4>>& matrix, std::vector<Vector4
 
 /**
  * Least squares fit. The end points are weighted so that they are met; third differences of the
- * coefficients are held small where the points alone do not decide.
+ * coefficients are held small where the points alone do not decide. No knot lies next to an end: the curve's bend at
+ * the end would be anything.
  */
 Spline Fit(const std::vector<double>& t, const std::vector<Vector4>& values,
   const std::vector<double>& minimumKnots)
@@ -128,7 +129,7 @@ Spline Fit(const std::vector<double>& t, const std::vector<Vector4>& values,
   spline.knots.assign(4, 0.0);
   double last = 0.0;
   const double length = t.back();
-  for (std::size_t i = 1; i + 1 < t.size(); ++i)
+  for (std::size_t i = 2; i + 2 < t.size(); ++i)
   {
     const double minimum = minimumKnots[i];
     if (t[i] - last >= minimum && length - t[i] >= minimum)

@@ -126,6 +126,28 @@ void AddTetrahedron(
 }
 }
 
+TEST(VesselAxis, DoesNotCurlAtItsEnds)
+{
+  // As far apart as knots may be, with a kink 1.5 mm before the end: which points get a knot is chance.
+  for (int n = 0; n < 20; ++n)
+  {
+    std::vector<Vector3> points;
+    Vector3 at = Vector3::Zero();
+    double angle = 0.0;
+    for (int i = 0; i < 60; ++i)
+    {
+      points.push_back(at);
+      angle += i == 54 ? 0.16 : 0.01;
+      at += (0.3 + 0.01 * std::sin(1.7 * i + n)) * Vector3(std::cos(angle), std::sin(angle), 0.0);
+    }
+    const VesselAxis axis(points, std::vector<double>(60, 0.56 + 0.004 * n), 0.5, true, true);
+    for (const VesselAxis::Station& end : { axis.AllStations().front(), axis.AllStations().back() })
+    {
+      EXPECT_LT(end.curvature.norm(), 0.4) << n;
+    }
+  }
+}
+
 TEST(SweepSurface, StraightTubeHasItsRadius)
 {
   for (const double radius : { 0.4, 1.5, 3.0 })
