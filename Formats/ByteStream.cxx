@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 namespace
 {
-constexpr std::size_t BlockBytes = 256u << 10;
+constexpr std::size_t ReadAtOnce = 256u << 10;
 }
 
 struct ByteStream::Internals
@@ -55,7 +55,7 @@ struct ByteStream::Internals
     this->Ended = false;
     this->Position = 0;
     this->Stream.avail_in = 0;
-    this->Packed.resize(BlockBytes);
+    this->Packed.resize(ReadAtOnce);
   }
 
   bool Refill()
@@ -147,7 +147,7 @@ std::size_t ByteStream::ReadSome(
   {
     impl.Rewind();
   }
-  impl.Skipped.resize(BlockBytes);
+  impl.Skipped.resize(ReadAtOnce);
   while (impl.Position < position)
   {
     if (poll)

@@ -13,7 +13,7 @@ namespace
 /// More would not fit into any memory, and products of it stay integers.
 constexpr std::int64_t MostValues = std::int64_t{ 1 } << 40;
 
-std::int64_t Count(TextScanner& file)
+std::int64_t MatrixSide(TextScanner& file)
 {
   const std::int64_t count = file.Integer();
   if (count < 0 || count > MostValues)
@@ -39,13 +39,13 @@ void CheckSize(const TextScanner& file, std::int64_t columns, std::int64_t rows,
 Eigen::MatrixXd ReadMatrixFile(const std::string& path)
 {
   TextScanner file(path);
-  std::int64_t columns = Count(file);
-  std::int64_t rows = Count(file);
+  std::int64_t columns = MatrixSide(file);
+  std::int64_t rows = MatrixSide(file);
   const bool binary = columns == 0 && rows == 0 && !file.AtEnd();
   if (binary)
   {
-    columns = Count(file);
-    rows = Count(file);
+    columns = MatrixSide(file);
+    rows = MatrixSide(file);
     std::size_t at = file.Position();
     const std::string& text = file.Text();
     at += at < text.size() && text[at] == '\r' ? 1 : 0;

@@ -17,7 +17,7 @@ namespace coronary
 {
 namespace
 {
-constexpr std::size_t BlockBytes = 1u << 20;
+constexpr std::size_t WrittenAtOnce = 1u << 20;
 // Room for any 64-bit number: the size of the compressed data is known only after it is written.
 constexpr int SizeDigits = 20;
 
@@ -108,7 +108,7 @@ void Write(const std::string& path, const ImageGrid& grid, const void* values,
   for (std::uint64_t position = 0; position < total;)
   {
     const auto block =
-      static_cast<std::size_t>(std::min<std::uint64_t>(BlockBytes, total - position));
+      static_cast<std::size_t>(std::min<std::uint64_t>(WrittenAtOnce, total - position));
     output.Add(bytes + position, block);
     position += block;
     Report(progress, static_cast<double>(position) / static_cast<double>(total));

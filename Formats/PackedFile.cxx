@@ -7,7 +7,7 @@ namespace coronary
 {
 namespace
 {
-constexpr std::size_t BlockBytes = 1u << 20;
+constexpr std::size_t PackedAtOnce = 1u << 20;
 }
 
 PackedFile::PackedFile(const std::string& path, const std::string& header, Packing packing)
@@ -19,7 +19,7 @@ PackedFile::PackedFile(const std::string& path, const std::string& header, Packi
   {
     return;
   }
-  this->Packed.resize(BlockBytes);
+  this->Packed.resize(PackedAtOnce);
   // Noisy voxels gain little from higher levels, which are several times slower.
   const int level = packing == Packing::Gzip ? 1 : 2;
   // 16 more than the bits of the window: with gzip's header, without a date.
@@ -49,7 +49,7 @@ void PackedFile::Add(const void* data, std::size_t bytes)
   const auto* from = static_cast<const unsigned char*>(data);
   for (std::size_t done = 0; done < bytes;)
   {
-    const std::size_t block = std::min(BlockBytes, bytes - done);
+    const std::size_t block = std::min(PackedAtOnce, bytes - done);
     this->Deflate(from + done, block, Z_NO_FLUSH);
     done += block;
   }

@@ -23,6 +23,7 @@
 #include <vector>
 
 namespace names = vtkCoronaryArrayNames;
+using SDDP = vtkStreamingDemandDrivenPipeline;
 
 vtkStandardNewMacro(vtkTGFReader);
 
@@ -91,7 +92,6 @@ int vtkTGFReader::RequestInformation(
 int vtkTGFReader::RequestData(
   vtkInformation* request, vtkInformationVector**, vtkInformationVector* outputs)
 {
-  using SDDP = vtkStreamingDemandDrivenPipeline;
   const int port = std::max(0, request->Get(SDDP::FROM_OUTPUT_PORT()));
   if (outputs->GetInformationObject(port)->Get(SDDP::UPDATE_PIECE_NUMBER()) > 0)
   {

@@ -2,6 +2,7 @@
 
 #include "ItemSharing.h"
 #include "MeshSequenceReport.h"
+#include "Numbers.h"
 #include "PartialProgress.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
@@ -35,8 +36,6 @@ vtkStandardNewMacro(vtkMeshSequenceWriter);
 
 namespace
 {
-constexpr double Degree = 0.017453292519943295769;
-
 /// As the report counts them.
 std::string PhaseName(std::size_t phase, double time)
 {
@@ -346,7 +345,7 @@ vtkMeshSequenceWriter::Run::Run(vtkMeshSequenceWriter* self, vtkInformation* inf
   {
     this->Times.push_back(0.0);
   }
-  this->Result.poorAngle = self->PoorDihedralAngle * Degree;
+  this->Result.poorAngle = self->PoorDihedralAngle * coronary::Degree;
 }
 
 /// @throws std::invalid_argument when it is empty or of another time

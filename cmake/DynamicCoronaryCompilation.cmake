@@ -12,6 +12,9 @@ if(NOT DYNAMICCORONARY_SANITIZE)
   endforeach()
 endif()
 
+# Several sources in one compilation: headers are read, and templates made, once for all of them. Off, a changed source is compiled alone.
+option(CMAKE_UNITY_BUILD "Compile several sources at once: a whole build takes half the time, a change of one source longer" ON)
+
 add_library(dynamiccoronary_options INTERFACE)
 target_compile_options(dynamiccoronary_options INTERFACE -Wall -Wextra -Wshadow)
 if(DYNAMICCORONARY_WARNINGS_AS_ERRORS)
@@ -20,6 +23,11 @@ if(DYNAMICCORONARY_WARNINGS_AS_ERRORS)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 13)
     target_compile_options(dynamiccoronary_options INTERFACE -Wno-array-bounds -Wno-stringop-overflow)
   endif()
+endif()
+
+# A class of a source that keeps what is known in that source only: GCC takes the source for a header when it is compiled with others.
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_UNITY_BUILD)
+  target_compile_options(dynamiccoronary_options INTERFACE -Wno-subobject-linkage)
 endif()
 
 if(DYNAMICCORONARY_SANITIZE)
@@ -53,4 +61,43 @@ function(dynamiccoronary_module_options module)
   vtk_module_link("${module}" PRIVATE "$<BUILD_INTERFACE:dynamiccoronary_options>" ${ARGN})
   # Not all VTK versions do it: installed libraries find each other wherever they lie.
   vtk_module_set_property("${module}" PROPERTY INSTALL_RPATH VALUE "$ORIGIN")
+endfunction()
+
+# dynamiccoronary_seldom_run(<target> [hot source ...])
+#   What reads command lines and JSON, calls libraries and fills windows does no other work: GCC takes a third less so for the
+#   libraries' templates. Sources with loops over voxels, points or pixels are named.
+function(dynamiccoronary_seldom_run target)
+  target_compile_options("${target}" PRIVATE "$<$<CONFIG:Release>:-O1>")
+  set_property(SOURCE ${ARGN} APPEND PROPERTY COMPILE_OPTIONS "$<$<CONFIG:Release>:-O3>")
+endfunction()
+
+# dynamiccoronary_batches(<target> <size>)
+#   Which sources of a target are compiled at once: as many of one folder. Without it CMake takes eight as they come. Sources with
+#   options of their own stay alone.
+function(dynamiccoronary_batches target size)
+  get_target_property(sources "${target}" SOURCES)
+  list(FILTER sources INCLUDE REGEX "\\.cxx$")
+  set(folders)
+  foreach(source IN LISTS sources)
+    get_filename_component(folder "${source}" DIRECTORY)
+    string(MAKE_C_IDENTIFIER "in_${folder}" folder)
+    list(APPEND folders "${folder}")
+    list(APPEND "${folder}" "${source}")
+  endforeach()
+  list(REMOVE_DUPLICATES folders)
+  foreach(folder IN LISTS folders)
+    list(LENGTH "${folder}" count)
+    math(EXPR batches "(${count} + ${size} - 1) / ${size}")
+    set(index 0)
+    foreach(source IN LISTS "${folder}")
+      # The innermost loops are what they are, whatever is beside them.
+      if(source MATCHES "Kernels")
+        set_property(SOURCE "${source}" PROPERTY SKIP_UNITY_BUILD_INCLUSION ON)
+      endif()
+      math(EXPR batch "${index} * ${batches} / ${count}")
+      set_property(SOURCE "${source}" PROPERTY UNITY_GROUP "${folder}_${batch}")
+      math(EXPR index "${index} + 1")
+    endforeach()
+  endforeach()
+  set_target_properties("${target}" PROPERTIES UNITY_BUILD_MODE GROUP)
 endfunction()

@@ -3,7 +3,7 @@
 set -euo pipefail
 
 if [ "${1:-}" = -h ] || [ "${1:-}" = --help ]; then
-  echo "Usage: scripts/lint.sh [build-folder (build/paraview)] [file-regex ...]"
+  echo "Usage: scripts/lint.sh [build-folder (build/develop)] [file-regex ...]"
   exit 0
 fi
 build="${1:-}"
@@ -12,7 +12,10 @@ if [ -n "$build" ]; then
   shift
 fi
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-build="${build:-$PWD/build/paraview}"
+if [ -z "$build" ]; then
+  build="$PWD/build/develop"
+  cmake --preset develop >/dev/null
+fi
 
 tidy=""
 runner=""
@@ -28,7 +31,11 @@ if [ -z "$tidy" ]; then
   exit 1
 fi
 if [ ! -f "$build/compile_commands.json" ]; then
-  echo "lint: no compile_commands.json in $build; configure it first (cmake --preset paraview)" >&2
+  echo "lint: no compile_commands.json in $build; configure it first (cmake --preset develop)" >&2
+  exit 1
+fi
+if grep -q '^CMAKE_UNITY_BUILD:[A-Z]*=ON' "$build/CMakeCache.txt"; then
+  echo "lint: $build compiles several sources at once, and its commands name none of them: take build/develop" >&2
   exit 1
 fi
 

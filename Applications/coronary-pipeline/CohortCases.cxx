@@ -50,7 +50,7 @@ void RequireKnown(const Json& object, const std::set<std::string>& known, const 
   }
 }
 
-std::string TextOf(const Json& value, const std::string& where)
+std::string FilledText(const Json& value, const std::string& where)
 {
   if (!value.is_string() || value.get<std::string>().empty())
   {
@@ -61,7 +61,7 @@ std::string TextOf(const Json& value, const std::string& where)
 
 std::string ExistingPath(const Json& value, const fs::path& folder, const std::string& where)
 {
-  const fs::path path = fs::absolute(folder / TextOf(value, where)).lexically_normal();
+  const fs::path path = fs::absolute(folder / FilledText(value, where)).lexically_normal();
   std::error_code ignored;
   if (!fs::exists(path, ignored))
   {
@@ -72,7 +72,7 @@ std::string ExistingPath(const Json& value, const fs::path& folder, const std::s
 
 std::string NameOf(const Json& value, const std::string& where)
 {
-  std::string name = TextOf(value, where);
+  std::string name = FilledText(value, where);
   const bool plain = std::all_of(name.begin(), name.end(),
     [](char c)
     {

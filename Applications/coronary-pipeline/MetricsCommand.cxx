@@ -1,4 +1,5 @@
 #include "Command.h"
+#include "ReportJson.h"
 
 #include "DistanceOptions.h"
 #include "Interruption.h"
@@ -77,11 +78,6 @@ std::vector<std::pair<const char*, double>> Measures(const MeshDistance& d)
     { "quadrature_error", d.quadratureError } };
 }
 
-nlohmann::ordered_json PointOf(const Vector3& p)
-{
-  return { p[0], p[1], p[2] };
-}
-
 void PrintJson(const MeshDistance& d, double seconds)
 {
   nlohmann::ordered_json all;
@@ -90,8 +86,8 @@ void PrintJson(const MeshDistance& d, double seconds)
     all[name] = value;
   }
   all["seconds"] = seconds;
-  all["HD_AB_points"] = { PointOf(d.ab.at), PointOf(d.ab.nearest) };
-  all["HD_BA_points"] = { PointOf(d.ba.at), PointOf(d.ba.nearest) };
+  all["HD_AB_points"] = { PlaceOf(d.ab.at), PlaceOf(d.ab.nearest) };
+  all["HD_BA_points"] = { PlaceOf(d.ba.at), PlaceOf(d.ba.nearest) };
   all["area_A"] = d.ab.area;
   all["area_B"] = d.ba.area;
   all["branches"] = nlohmann::ordered_json::array();

@@ -2,6 +2,7 @@
 
 #include "BoundedJson.h"
 #include "Fnv1a.h"
+#include "ReportJson.h"
 #include "TextFile.h"
 #include "UtcTime.h"
 
@@ -68,13 +69,6 @@ double Rounded(double value)
 std::string Name(RunStage stage)
 {
   return RunStageNames()[static_cast<std::size_t>(stage)];
-}
-
-/// The member, or null.
-Json Member(const Json& object, const std::string& name)
-{
-  const auto found = object.is_object() ? object.find(name) : object.end();
-  return object.is_object() && found != object.end() ? *found : Json();
 }
 
 /// The entry of a stage in a list of stages, or null.

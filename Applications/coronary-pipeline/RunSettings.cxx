@@ -48,7 +48,7 @@ void CheckValue(const CLI::Validator& check, std::string text, const std::string
   }
 }
 
-Json Number(double value)
+Json NumberOrNull(double value)
 {
   return std::isnan(value) ? Json() : Json(value);
 }
@@ -548,7 +548,7 @@ nlohmann::ordered_json RunOptions::All() const
         using Type = std::decay_t<decltype(*variable)>;
         if constexpr (std::is_same_v<Type, double>)
         {
-          value = Number(*variable);
+          value = NumberOrNull(*variable);
         }
         else if constexpr (std::is_same_v<Type, std::vector<double>>)
         {

@@ -1,6 +1,7 @@
 #include "vtkBridgeReport.h"
 
 #include "BridgeCheck.h"
+#include "ReportJson.h"
 #include "TreeCheck.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
@@ -46,12 +47,7 @@ std::pair<std::string, double> NearestVessel(vtkPolyData* tree, const Vector3& p
   return { name.empty() ? "unnamed branch" : name, minimum };
 }
 
-nlohmann::ordered_json Place(const Vector3& p)
-{
-  return { p[0], p[1], p[2] };
-}
-
-Vector3 PlaceOf(const nlohmann::ordered_json& place)
+Vector3 ReadPlace(const nlohmann::ordered_json& place)
 {
   return { place[0].get<double>(), place[1].get<double>(), place[2].get<double>() };
 }
@@ -105,8 +101,8 @@ nlohmann::ordered_json DescribeBridges(
     {
       length += (bridge.points[n] - bridge.points[n - 1]).norm();
     }
-    list.push_back({ { "vessel", vessel }, { "from", Place(bridge.points.front()) },
-      { "to", Place(bridge.points.back()) }, { "length_mm", length },
+    list.push_back({ { "vessel", vessel }, { "from", PlaceOf(bridge.points.front()) },
+      { "to", PlaceOf(bridge.points.back()) }, { "length_mm", length },
       { "unseen_mm", bridge.unseen }, { "confidence", bridge.confidence },
       { "kind", BridgeKindName(KindOfBridge(bridge, interpolator, blood)) } });
   }
@@ -122,7 +118,7 @@ nlohmann::ordered_json DescribeVeins(vtkPolyData* tree)
   vtkDataArray* probabilities = data->GetArray(vtkCoronaryArrayNames::VeinProbabilities);
   for (vtkIdType n = 0; positions && n < positions->GetNumberOfTuples(); ++n)
   {
-    list.push_back({ { "position", Place(Vector3(positions->GetTuple3(n))) },
+    list.push_back({ { "position", PlaceOf(Vector3(positions->GetTuple3(n))) },
       { "length_mm", lengths->GetTuple1(n) }, { "probability", probabilities->GetTuple1(n) } });
   }
   return list;
@@ -137,7 +133,7 @@ std::vector<std::string> BridgeWarnings(const nlohmann::ordered_json& bridges)
     {
       continue;
     }
-    const VesselBridge crossed{ { PlaceOf(bridge["from"]), PlaceOf(bridge["to"]) },
+    const VesselBridge crossed{ { ReadPlace(bridge["from"]), ReadPlace(bridge["to"]) },
       bridge["confidence"].get<double>(), bridge["unseen_mm"].get<double>() };
     warnings.push_back(OcclusionWarning(crossed, bridge["vessel"].get<std::string>()).what + ".");
   }
@@ -149,7 +145,7 @@ std::vector<std::string> VeinWarnings(const nlohmann::ordered_json& veins)
   std::vector<std::string> warnings;
   for (const auto& vein : veins)
   {
-    if (const auto warning = DoubtfulVeinWarning(PlaceOf(vein["position"]),
+    if (const auto warning = DoubtfulVeinWarning(ReadPlace(vein["position"]),
           vein["length_mm"].get<double>(), vein["probability"].get<double>()))
     {
       warnings.push_back(warning->what + ".");

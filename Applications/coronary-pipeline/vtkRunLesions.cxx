@@ -6,6 +6,7 @@
 #include "LumenLevels.h"
 #include "LumenRefinement.h"
 #include "MetaImageWriter.h"
+#include "ReportJson.h"
 #include "StenosisGrading.h"
 #include "VesselPaths.h"
 #include "vtkVesselTree.h"
@@ -58,11 +59,6 @@ struct Measurement : TreeLumen
   ScalarImage image;
 };
 
-Json Position(const Vector3& position)
-{
-  return { position[0], position[1], position[2] };
-}
-
 std::string NameOf(int segmentId)
 {
   const std::string name = SegmentName(segmentId);
@@ -71,7 +67,7 @@ std::string NameOf(int segmentId)
 
 Json Describe(const Stenosis& lesion)
 {
-  return { { "vessel", NameOf(lesion.segmentId) }, { "position", Position(lesion.position) },
+  return { { "vessel", NameOf(lesion.segmentId) }, { "position", PlaceOf(lesion.position) },
     { "abscissa_start_mm", lesion.abscissaStart }, { "abscissa_least_mm", lesion.abscissaMinimum },
     { "abscissa_end_mm", lesion.abscissaEnd }, { "length_mm", lesion.length },
     { "least_diameter_mm", lesion.minimumDiameter },
@@ -109,7 +105,7 @@ Json DescribeCalcium(const Measurement& measurement)
   for (const CalciumObject& object : measurement.calcium.objects)
   {
     objects.push_back({ { "label", object.label }, { "vessel", NameOf(object.segmentId) },
-      { "position", Position(object.centre) }, { "abscissa_start_mm", object.abscissaStart },
+      { "position", PlaceOf(object.centre) }, { "abscissa_start_mm", object.abscissaStart },
       { "abscissa_end_mm", object.abscissaEnd }, { "volume_mm3", object.volume },
       { "corrected_volume_mm3", object.correctedVolume }, { "peak_hu", object.peak },
       { "density_hu", object.density }, { "arc_deg", object.arc }, { "score", object.score } });
@@ -135,8 +131,8 @@ Json DescribeCalcium(const Measurement& measurement)
       const std::int64_t from = path.points[first];
       const std::int64_t to = path.points[i];
       const int segment = tree.segmentId.empty() ? 0 : tree.segmentId[from];
-      hidden.push_back({ { "vessel", NameOf(segment) }, { "from", Position(tree.points[from]) },
-        { "to", Position(tree.points[to]) }, { "length_mm", path.arc[i] - path.arc[first] } });
+      hidden.push_back({ { "vessel", NameOf(segment) }, { "from", PlaceOf(tree.points[from]) },
+        { "to", PlaceOf(tree.points[to]) }, { "length_mm", path.arc[i] - path.arc[first] } });
     }
   }
   return { { "objects", objects }, { "score_by_segment", scores }, { "score", score },

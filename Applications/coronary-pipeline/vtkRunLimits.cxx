@@ -2,6 +2,7 @@
 
 #include "Geometry.h"
 #include "PoseSequence.h"
+#include "ReportJson.h"
 #include "vtkMessageTrap.h"
 #include "vtkRunTrees.h"
 #include "vtkVesselTree.h"
@@ -35,11 +36,6 @@ constexpr std::array<const char*, 5> LimitNames = { "bending", "curvature", "str
 std::string NameOf(const VesselTree::Branch& branch)
 {
   return branch.name.empty() ? "branch " + std::to_string(branch.groupId) : branch.name;
-}
-
-Json Place(const Vector3& place)
-{
-  return { place[0], place[1], place[2] };
 }
 
 double LengthOf(const std::vector<std::int64_t>& line, const std::vector<Vector3>& points)
@@ -150,7 +146,7 @@ Json DescribeFilled(vtkAlgorithm* tracked, vtkPolyData* tree, vtkMessageTrap& me
             { "status", piece.status == TrackingStatus::Lost ? "lost" : "filled" },
             { "length_mm", LengthOf(piece.points, rest.points) },
             { "confidence", sum / static_cast<double>(piece.points.size()) },
-            { "place", Place(rest.points[piece.points[piece.points.size() / 2]]) } });
+            { "place", PlaceOf(rest.points[piece.points[piece.points.size() / 2]]) } });
         }
       }
     });
@@ -174,7 +170,7 @@ Json DescribePlacement(vtkAlgorithm* moving, vtkPolyData* tree, vtkMessageTrap& 
         {
           branches.push_back({ { "vessel", NameOf(branch) }, { "confidence", own },
             { "time", time }, { "length_mm", LengthOf(branch.points, rest.points) },
-            { "place", Place(rest.points[branch.points[branch.points.size() / 2]]) },
+            { "place", PlaceOf(rest.points[branch.points[branch.points.size() / 2]]) },
             { "phases", Json::array() } });
         }
         Json& told = branches[n];
@@ -253,7 +249,7 @@ Json DescribeLimits(vtkMotionRegularizer* lines, vtkMotionRegularizer* skeleton,
             clamped.push_back(
               { { "vessel", NameOf(branch) }, { "time", time }, { "limit", LimitNames[bit] },
                 { "points", points.size() }, { "greatest_move_mm", farthest },
-                { "place", Place(rest.points[points[points.size() / 2]]) } });
+                { "place", PlaceOf(rest.points[points[points.size() / 2]]) } });
           }
         }
       }

@@ -1,6 +1,7 @@
 #include "vtkRunResult.h"
 
 #include "BoundedJson.h"
+#include "ReportJson.h"
 #include "RunSettings.h"
 #include "TextFile.h"
 #include "vtkCoronaryArrayNames.h"
@@ -32,12 +33,6 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 /// The member, or null.
-Json Member(const Json& object, const std::string& name)
-{
-  const auto found = object.is_object() ? object.find(name) : object.end();
-  return object.is_object() && found != object.end() ? *found : Json();
-}
-
 bool IsFile(const fs::path& path)
 {
   std::error_code error;

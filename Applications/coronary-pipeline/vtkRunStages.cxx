@@ -814,8 +814,6 @@ Json MakeWeights(RunStep& step)
   return numbers;
 }
 
-constexpr int PhaseDigits = 2;
-
 /// The masks of a series.json, one a phase; empty when none of them has one.
 std::vector<std::string> MasksOfSeries(const std::string& path)
 {

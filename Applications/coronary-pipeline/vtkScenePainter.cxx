@@ -1,6 +1,7 @@
 #include "vtkScenePainter.h"
 
 #include "Interruption.h"
+#include "Numbers.h"
 
 #include "vtkActor.h"
 #include "vtkCamera.h"
@@ -27,7 +28,6 @@ constexpr int Oversampling = 2;
 
 PictureView ViewFrom(double leftAnterior, double cranial)
 {
-  constexpr double Degree = 3.14159265358979323846 / 180.0;
   const double a = leftAnterior * Degree;
   const double c = cranial * Degree;
   PictureView view;

@@ -1,5 +1,6 @@
 #include "vtkSimVascularForms.h"
 
+#include "Numbers.h"
 #include "TgfSkeleton.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
@@ -29,7 +30,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 constexpr const char* BranchId = "BranchId";
 constexpr const char* BifurcationId = "BifurcationId";
 constexpr const char* CenterlineId = "CenterlineId";

@@ -1,5 +1,6 @@
 #include "vtkPosingModel.h"
 
+#include "Numbers.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
@@ -33,7 +34,6 @@ namespace
 namespace fs = std::filesystem;
 namespace names = vtkCoronaryArrayNames;
 
-constexpr double Degree = 3.14159265358979323846 / 180.0;
 constexpr std::size_t RememberedSteps = 1000;
 constexpr int LongestChain = 64;
 

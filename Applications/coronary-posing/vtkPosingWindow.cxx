@@ -1,4 +1,5 @@
 #include "Interruption.h"
+#include "Numbers.h"
 #include "PosingSession.h"
 #include "vtkMessageTrap.h"
 #include "vtkPosingModel.h"
@@ -49,7 +50,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Degree = 3.14159265358979323846 / 180.0;
 constexpr double MoveStep = 0.5;          // mm a key press
 constexpr double TurnStep = 5.0 * Degree; // a key press
 constexpr double WidenStep = 1.1;         // a key press

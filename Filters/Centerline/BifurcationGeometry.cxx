@@ -1,6 +1,7 @@
 #include "BifurcationGeometry.h"
 
 #include "Median.h"
+#include "Numbers.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,9 +13,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
-constexpr double Infinity = std::numeric_limits<double>::infinity();
-
 /// Direction of a branch over a stretch from one of its ends, by a fitted line; away from the end.
 Vector3 EndDirection(const CenterlineTopology& tree, const VesselTree::Branch& branch,
   bool fromStart, double low, double high)

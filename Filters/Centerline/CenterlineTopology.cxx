@@ -4,6 +4,7 @@
 #include "DraftBranches.h"
 #include "LineGraph.h"
 #include "Median.h"
+#include "Numbers.h"
 #include "Require.h"
 
 #include <algorithm>
@@ -18,7 +19,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 constexpr double LongestLine = 1e6; ///< in median radii: edges lie in cells of two radii
 
 void Check(const Polylines& lines, const std::vector<Vector3>& roots)

@@ -1,5 +1,7 @@
 #include "CurveGeometry.h"
 
+#include "Numbers.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,7 +12,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 constexpr int Degree = 5;
 constexpr int Order = Degree + 1;
 constexpr int Penalised = 3; ///< derivative whose square is penalised

@@ -27,7 +27,7 @@ constexpr double MostAddressesPerMember = 1.3;
 // While marching the bits of an arrival say what a voxel is. As numbers without sign:
 // final arrivals < not reached < not in the region < on the front (the sign is set).
 constexpr std::uint32_t NotReached = 0x7f800000U; ///< infinity
-constexpr std::uint32_t Outside = 0x7fffffffU;
+constexpr std::uint32_t OutsideGrid = 0x7fffffffU;
 constexpr std::uint32_t OnFront = 0x80000000U;
 
 inline std::uint32_t BitsOf(float value)
@@ -287,7 +287,7 @@ public:
     , Progress(progress)
     , Place(layout)
     , Queue(bucketWidth)
-    , Voxels(layout.Size(), { Outside, 1.0F })
+    , Voxels(layout.Size(), { OutsideGrid, 1.0F })
     , Labels(oneLabel ? 0 : layout.Size(), FastMarching::noSource)
     , OneLabel(oneLabel)
   {
@@ -475,7 +475,7 @@ inline __attribute__((always_inline)) void Front<Layout>::RunAs()
         const std::uint32_t before = around.bits[axis][1 + side];
         const std::uint32_t opposite = around.bits[axis][3 * side];
         // Final, outside, or known already from its other side: then this one changes nothing.
-        if (IsFinal(before) || before == Outside || opposite < arrivalBits)
+        if (IsFinal(before) || before == OutsideGrid || opposite < arrivalBits)
         {
           continue;
         }

@@ -1,6 +1,7 @@
 #include "LineGraph.h"
 
 #include "DisjointSets.h"
+#include "Numbers.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,8 +14,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Infinity = std::numeric_limits<double>::infinity();
-
 /// A stretch alongside another vessel is the same vessel when it is longer than this many radii;
 /// a daughter leaves its parent's neighbourhood sooner.
 constexpr double OverlapLength = 5.0;

@@ -31,7 +31,7 @@ constexpr double MinimumShare = 0.15;  ///< of the contrast between muscle and b
 constexpr double TooBright = 1.6;      ///< the same: bone
 constexpr double Thin = 1.2;           ///< mm, radius
 constexpr double Step = 1.0;           ///< mm between sections
-constexpr double Outside = 1.5;        ///< mm beyond the wall of the tree's vessels
+constexpr double BeyondWall = 1.5;     ///< mm beyond the wall of the tree's vessels
 constexpr double SeenConfidence = 0.5; ///< of a section with a lumen all around
 /// Great cardiac, middle and marginal veins run in the grooves and beside branches, some millimetres off the artery.
 constexpr double BesideReach = 10.0; ///< mm
@@ -307,7 +307,7 @@ std::vector<std::vector<std::int64_t>> Search::Pieces() const
       low[axis] = std::min(low[axis], std::max(0, (*at)[axis] - reach));
       high[axis] = std::max(high[axis], std::min(size[axis] - 1, (*at)[axis] + reach));
     }
-    this->L.Ball(*at, this->I.tree.radius[p] + Outside,
+    this->L.Ball(*at, this->I.tree.radius[p] + BeyondWall,
       [&](std::int64_t voxel, const std::array<int, 3>&) { taken[voxel] = 1; });
   }
   const double minimum = MinimumTube * this->Tube;
@@ -499,7 +499,8 @@ bool Search::GoesOn(const std::vector<Vector3>& axis) const
         {
           const Vector3 gap = begin - tip.position;
           // Over a short gap its direction says nothing.
-          const bool ahead = gap.norm() < Outside || gap.dot(tip.ahead) > OnwardCosine * gap.norm();
+          const bool ahead =
+            gap.norm() < BeyondWall || gap.dot(tip.ahead) > OnwardCosine * gap.norm();
           return gap.norm() < OnwardGap && ahead && along.dot(tip.ahead) > OnwardCosine;
         });
     });

@@ -15,10 +15,10 @@ namespace coronary
 {
 namespace
 {
-constexpr double Wavelength = 50.0;     ///< mm, of changes along a vessel that are followed
-constexpr double WideEnough = 2.5;      ///< blurs: such a radius shows its contrast at its centre
-constexpr double Spread = 0.07;         ///< of levels, relative; what is farther off counts less
-constexpr double BrightestShare = 1.25; ///< of the tree's median: what is above is calcium
+constexpr double LevelWavelength = 50.0; ///< mm, of changes along a vessel that are followed
+constexpr double WideEnough = 2.5;       ///< blurs: such a radius shows its contrast at its centre
+constexpr double Spread = 0.07;          ///< of levels, relative; what is farther off counts less
+constexpr double BrightestShare = 1.25;  ///< of the tree's median: what is above is calcium
 
 constexpr double UsualShare = 0.7; ///< of the wide places are dimmer: some were only taken for wide
 constexpr double DimmestShare = 0.6;  ///< of the usual contrast: what shows less is no wide lumen
@@ -194,7 +194,7 @@ LumenLevels MeasureLumenLevels(const VesselTree& tree, const std::vector<VesselP
     double scale = 0.3;
     for (int pass = 0; pass < 6; ++pass)
     {
-      smooth = SmoothSequence(own, robust, Wavelength / step);
+      smooth = SmoothSequence(own, robust, LevelWavelength / step);
       scale = std::max(Spread, 0.5 * scale);
       for (std::size_t i = 0; i < points; ++i)
       {

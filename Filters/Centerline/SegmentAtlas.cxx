@@ -1,5 +1,7 @@
 #include "SegmentAtlas.h"
 
+#include "Numbers.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -7,7 +9,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 constexpr double Spacing = 2.0;
 
 struct Frame

@@ -1,6 +1,7 @@
 #include "SegmentLabeling.h"
 
 #include "LabelPieces.h"
+#include "Numbers.h"
 #include "SegmentAtlas.h"
 #include "SegmentNaming.h"
 #include "TreeAssignment.h"
@@ -10,7 +11,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <numeric>
 #include <stdexcept>
@@ -19,8 +19,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
-constexpr double Infinity = std::numeric_limits<double>::infinity();
 constexpr double Correlation = 10.0; ///< length of vessel that counts as one observation
 constexpr double CourseWeight = 1.0; ///< of 1 - cos(angle between courses)
 constexpr double Unnamed = 2.2;      ///< cost of an observation on a vessel without a name

@@ -1,8 +1,9 @@
 #include "SegmentNaming.h"
 
+#include "Numbers.h"
+
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 
 namespace coronary
@@ -11,7 +12,6 @@ namespace
 {
 using V = Vessel;
 
-constexpr double Infinity = std::numeric_limits<double>::infinity();
 constexpr double MinimumNumbered = 8.0; ///< shorter side branches are not counted
 constexpr double OriginDeviation = 8.0; ///< of a side branch's origin along its vessel
 constexpr double NumberedCourse = 1.0;  ///< weight of a side branch's course beside its origin

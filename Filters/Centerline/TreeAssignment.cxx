@@ -1,9 +1,10 @@
 #include "TreeAssignment.h"
 
+#include "Numbers.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <utility>
 
@@ -13,8 +14,6 @@ namespace
 {
 using V = Vessel;
 
-constexpr double Pi = 3.14159265358979323846;
-constexpr double Infinity = std::numeric_limits<double>::infinity();
 constexpr double LongestUnnamed = 25.0; ///< conus, sinus node and atrial branches are short
 constexpr double UnnamedLength = 0.12;  ///< cost of a longer one with what hangs on it, for each mm
 constexpr double StemLength = 5.0;      ///< three arteries that leave the left main nearly together

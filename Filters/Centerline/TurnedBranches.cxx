@@ -19,7 +19,7 @@ namespace coronary
 namespace
 {
 constexpr double AgainstFlow = 2.0;  ///< rad between the flow and what leaves against it
-constexpr double Straight = 6.0;     ///< mm along which a direction is measured
+constexpr double CourseLength = 6.0; ///< mm along which a direction is measured
 constexpr double Beside = 8.0;       ///< mm between walls of vessels that run side by side
 constexpr double Parallel = 0.65;    ///< cosine between their courses
 constexpr double LongestPath = 30.0; ///< mm to the true root
@@ -96,7 +96,7 @@ TurnedFinder::Upstream TurnedFinder::Above(std::size_t branch) const
   for (std::size_t i = 0; i < count; ++i)
   {
     std::size_t up = i;
-    for (double passed = 0.0; up + 1 < count && passed < Straight; ++up)
+    for (double passed = 0.0; up + 1 < count && passed < CourseLength; ++up)
     {
       passed += (at(up + 1) - at(up)).norm();
     }
@@ -122,12 +122,12 @@ bool TurnedFinder::RunsBack(std::size_t branch, const Upstream& above, TurnedBra
   turned.branch = branch;
   turned.contact = within(mouth);
   turned.length = along.back();
-  if (along.back() < mouth + 0.5 * Straight || above.points.size() < 4)
+  if (along.back() < mouth + 0.5 * CourseLength || above.points.size() < 4)
   {
     return false;
   }
-  const Vector3 leaving =
-    this->Tree.points[points[within(mouth + Straight)]] - this->Tree.points[points[turned.contact]];
+  const Vector3 leaving = this->Tree.points[points[within(mouth + CourseLength)]] -
+    this->Tree.points[points[turned.contact]];
   if (!(UnitAngle(leaving.normalized(), above.flow.front()) > AgainstFlow))
   {
     return false;
@@ -232,7 +232,7 @@ void TurnedFinder::FindRoot(const Upstream& above, TurnedBranch& turned) const
   const Vector3& end = this->Tree.points[points.back()];
   const std::vector<double> along = ArcLengths(this->Tree, points);
   std::size_t back = points.size() - 1;
-  while (back > turned.contact && along.back() - along[back] < 0.5 * Straight)
+  while (back > turned.contact && along.back() - along[back] < 0.5 * CourseLength)
   {
     --back;
   }

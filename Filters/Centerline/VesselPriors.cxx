@@ -1,14 +1,9 @@
 #include "VesselPriors.h"
 
-#include <limits>
+#include "Numbers.h"
 
 namespace coronary
 {
-namespace
-{
-constexpr double Infinity = std::numeric_limits<double>::infinity();
-}
-
 const std::array<VesselCosts, NumberOfVessels>& BranchingCosts()
 {
   static const std::array<VesselCosts, NumberOfVessels> costs = []

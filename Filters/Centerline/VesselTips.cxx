@@ -12,15 +12,15 @@ namespace
 {
 /// mm before a tip, of its three sections: healthy vessels lose 0.1 mm of radius at most from the second to the first.
 constexpr double Sections[] = { 0.0, 2.0, 5.0, 9.0 };
-constexpr double MinimumLength = 4.0; ///< mm of vessel without which a tip is not judged
-constexpr double TipLength = 3.0;     ///< mm over which the calibre is taken
-constexpr double UsualTip = 0.48;     ///< mm, median radius of healthy tips
-constexpr double UsualBefore = 0.51;  ///< mm, the same in the second section
+constexpr double JudgedLength = 4.0; ///< mm of vessel without which a tip is not judged
+constexpr double TipLength = 3.0;    ///< mm over which the calibre is taken
+constexpr double UsualTip = 0.48;    ///< mm, median radius of healthy tips
+constexpr double UsualBefore = 0.51; ///< mm, the same in the second section
 
 /// Fitted to the tips of phantoms (scripts/fit-odds.sh). A unit is 0.1 mm of radius, in hearts of usual calibre.
 constexpr double Unit = 0.1;
-constexpr double Intercept = -5.56;
-constexpr std::array<FittedSign, NumberOfTipSigns> Signs{ {
+constexpr double TipIntercept = -5.56;
+constexpr std::array<FittedSign, NumberOfTipSigns> TipSigns{ {
   { "wide_before", 1.11 },
   { "tapers_before", 0.43 },
   { "wide_narrows", 1.35 },
@@ -36,7 +36,7 @@ bool IsTrunkOfRca(const VesselTree& tree, const VesselPath& path)
 
 const std::array<const char*, NumberOfTipSigns>& TipSignNames()
 {
-  static const auto names = NamesOf(Signs);
+  static const auto names = NamesOf(TipSigns);
   return names;
 }
 
@@ -81,8 +81,8 @@ std::vector<VesselTip> JudgeTips(const VesselTree& tree, const std::vector<Vesse
     tip.signs = { wide,
       farther > 0.0 ? std::clamp((farther - tip.before) / (Unit * calibre), -1.0, 3.0) : 0.0,
       narrows * std::max(0.0, wide) };
-    const bool judged = path.arc.back() >= MinimumLength && !IsTrunkOfRca(tree, path);
-    tip.goesOn = judged ? ProbabilityOf(FittedOdds(Intercept, Signs, tip.signs)) : 0.0;
+    const bool judged = path.arc.back() >= JudgedLength && !IsTrunkOfRca(tree, path);
+    tip.goesOn = judged ? ProbabilityOf(FittedOdds(TipIntercept, TipSigns, tip.signs)) : 0.0;
   }
   return tips;
 }

@@ -13,7 +13,7 @@ namespace
 {
 using Branch = VesselTree::Branch;
 
-[[noreturn]] void Fail(const std::string& message)
+[[noreturn]] void RefuseTracts(const std::string& message)
 {
   throw std::invalid_argument(message);
 }
@@ -23,11 +23,11 @@ void CheckTract(const VmtkTract& tract, std::size_t index)
   const std::string name = "tract " + std::to_string(index);
   if (tract.points.size() < 2)
   {
-    Fail(name + " has less than two points");
+    RefuseTracts(name + " has less than two points");
   }
   if (tract.radius.size() != tract.points.size())
   {
-    Fail(name + " has " + std::to_string(tract.radius.size()) + " radii for " +
+    RefuseTracts(name + " has " + std::to_string(tract.radius.size()) + " radii for " +
       std::to_string(tract.points.size()) + " points");
   }
   for (std::size_t i = 0; i < tract.points.size(); ++i)
@@ -35,7 +35,7 @@ void CheckTract(const VmtkTract& tract, std::size_t index)
     if (!tract.points[i].allFinite() || !(tract.radius[i] >= 0.0) ||
       !std::isfinite(tract.radius[i]))
     {
-      Fail("point " + std::to_string(i) + " of " + name +
+      RefuseTracts("point " + std::to_string(i) + " of " + name +
         " has a position or radius that can not be used");
     }
   }
@@ -156,7 +156,7 @@ VesselTree FromVmtkTracts(
   }
   if (!(tolerance >= 0.0 && std::isfinite(tolerance)))
   {
-    Fail("the tolerance must be 0 or more");
+    RefuseTracts("the tolerance must be 0 or more");
   }
   std::map<int, std::map<int, std::size_t>> paths;
   for (std::size_t t = 0; t < tracts.size(); ++t)
@@ -164,8 +164,9 @@ VesselTree FromVmtkTracts(
     CheckTract(tracts[t], t);
     if (!paths[tracts[t].centerlineId].emplace(tracts[t].tractId, t).second)
     {
-      Fail("tract " + std::to_string(t) + " has the number " + std::to_string(tracts[t].tractId) +
-        " on centerline " + std::to_string(tracts[t].centerlineId) + ", as another one");
+      RefuseTracts("tract " + std::to_string(t) + " has the number " +
+        std::to_string(tracts[t].tractId) + " on centerline " +
+        std::to_string(tracts[t].centerlineId) + ", as another one");
     }
   }
   VesselTree tree;
@@ -180,7 +181,8 @@ VesselTree FromVmtkTracts(
       const std::string name = "tract " + std::to_string(t);
       if (tractId != number)
       {
-        Fail("centerline " + std::to_string(path) + " has no tract " + std::to_string(number));
+        RefuseTracts(
+          "centerline " + std::to_string(path) + " has no tract " + std::to_string(number));
       }
       ++number;
       const auto known = branchOf.find(tract.groupId);
@@ -188,7 +190,7 @@ VesselTree FromVmtkTracts(
       {
         if (tree.branches[known->second].parentGroupId != parent)
         {
-          Fail(name + " of group " + std::to_string(tract.groupId) +
+          RefuseTracts(name + " of group " + std::to_string(tract.groupId) +
             " follows another group than the first tract of its group does");
         }
         parent = tract.groupId;
@@ -205,7 +207,7 @@ VesselTree FromVmtkTracts(
         const std::int64_t end = before.points.back();
         if ((tree.points[end] - tract.points.front()).norm() > tolerance)
         {
-          Fail(name + " does not begin where group " + std::to_string(parent) + " ends");
+          RefuseTracts(name + " does not begin where group " + std::to_string(parent) + " ends");
         }
         branch.points.push_back(end);
         first = 1;

@@ -1,5 +1,6 @@
 #include "vtkReferencePhase.h"
 
+#include "Numbers.h"
 #include "ParallelFor.h"
 #include "QuietestPhase.h"
 #include "vtkCoronaryArrayNames.h"
@@ -25,18 +26,18 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <vector>
 
 using vtkCoronary::Moment;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
+using coronary::NaN;
+
 namespace
 {
 constexpr int SampledSlices = 16;
 constexpr int BlockEdge = 4;
-constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
 
 /// Means over blocks of voxels; blocks at the far sides may be smaller.
 void SampleImage(vtkImageData* image, const std::array<int, 6>& part, std::vector<float>& samples)

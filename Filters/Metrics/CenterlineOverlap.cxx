@@ -1,6 +1,7 @@
 #include "CenterlineOverlap.h"
 
 #include "CenterlineSamples.h"
+#include "Numbers.h"
 
 #include <algorithm>
 #include <array>
@@ -15,8 +16,6 @@ namespace coronary
 namespace
 {
 using Measures = CenterlineOverlapMeasures;
-constexpr double NaN = Measures::NaN;
-constexpr double Infinite = std::numeric_limits<double>::infinity();
 constexpr double MaximumPairs = 4e10; // 5 GB of directions
 constexpr double CoarseSteps = 10.0;  // of the spacing, to choose which paths are compared
 
@@ -201,7 +200,7 @@ std::vector<Connection> Correspond(const CenterlineSamples& reference,
   }
   // Whether the best way to a pair comes along the result (else along the reference).
   std::vector<bool> alongResult(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns));
-  std::vector<double> cost(columns, Infinite);
+  std::vector<double> cost(columns, Infinity);
   std::vector<double> length(columns);
   for (std::int64_t i = 0; i < rows; ++i)
   {
@@ -213,7 +212,7 @@ std::vector<Connection> Correspond(const CenterlineSamples& reference,
       const double dz = z[j] - p.z();
       length[j] = std::sqrt(dx * dx + dy * dy + dz * dz);
     }
-    double left = i == 0 ? 0.0 : Infinite;
+    double left = i == 0 ? 0.0 : Infinity;
     auto bit = alongResult.begin() + i * columns;
     for (std::int64_t j = 0; j < columns; ++j, ++bit)
     {

@@ -2,6 +2,7 @@
 
 #include "BranchMetrics.h"
 #include "CenterlineOverlap.h"
+#include "Numbers.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
 #include "vtkCoronaryFilterParts.h"
@@ -28,7 +29,6 @@
 #include "vtkTable.h"
 
 #include <algorithm>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -38,6 +38,7 @@ using coronary::BranchAgreement;
 using coronary::BranchMetrics;
 using coronary::CenterlineOverlapMeasures;
 using coronary::CenterlinePointMatch;
+using coronary::NaN;
 using coronary::Polylines;
 using coronary::TreeBranch;
 using coronary::TreeOverlap;
@@ -49,8 +50,6 @@ vtkStandardNewMacro(vtkCenterlineMetrics);
 
 namespace
 {
-constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
-
 /// How far apart two times may be to be one.
 constexpr double TimeTolerance = 1e-3;
 

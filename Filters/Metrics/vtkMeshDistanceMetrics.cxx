@@ -1,6 +1,7 @@
 #include "vtkMeshDistanceMetrics.h"
 
 #include "MeshDistance.h"
+#include "Numbers.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryCompatibility.h"
 #include "vtkCoronaryFilterParts.h"
@@ -23,13 +24,13 @@
 #include "vtkTable.h"
 
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
 using coronary::BranchDistance;
 using coronary::MeshDistance;
+using coronary::NaN;
 using coronary::SideDistance;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
@@ -37,8 +38,6 @@ vtkStandardNewMacro(vtkMeshDistanceMetrics);
 
 namespace
 {
-constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
-
 using Row = std::vector<std::pair<const char*, double>>;
 
 Row TotalRow(const MeshDistance& d)

@@ -2,11 +2,11 @@
 
 #include "LineTracker.h"
 #include "Median.h"
+#include "Numbers.h"
 #include "Require.h"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -15,7 +15,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double NaN = std::numeric_limits<double>::quiet_NaN();
 /// Correlation of a vessel with what was expected, above which it counts as seen.
 constexpr double TrackedLikeness = 0.65;
 constexpr double TrackedConfidence = 0.5;

@@ -1,5 +1,7 @@
 #include "HarmonicFit.h"
 
+#include "Numbers.h"
+
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
@@ -14,7 +16,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double Pi = 3.14159265358979323846;
 /// Columns that one task works on.
 constexpr std::int64_t Grain = 8192;
 /// Of the Fourier fit, relative to its diagonal: enough to be solvable at any set of phases.

@@ -11,11 +11,11 @@ namespace coronary
 namespace
 {
 /// So far nodes tell of each other, and the standard deviation of their weights, mm.
-constexpr double Reach = 30.0;
+constexpr double DeformationReach = 30.0;
 constexpr double Width = 12.0;
 /// What a node's displacement is off an affine motion, mm, and how many nodes are off alike.
 constexpr double NodeDeviation = 1.0;
-constexpr double AlikeNodes = 5.0;
+constexpr double AlikeNeighbours = 5.0;
 /// Standard deviations of the components of what hearts do: strain, and rotation in radians.
 constexpr double UsualStrain = 0.15;
 constexpr double UsualRotation = 0.4;
@@ -30,7 +30,7 @@ LocalDeformation::LocalDeformation(const LineNodes& nodes)
     for (std::size_t other = 0; other < nodes.size(); ++other)
     {
       const double apart = (this->Positions[other] - this->Positions[n]).norm();
-      if (apart <= Reach)
+      if (apart <= DeformationReach)
       {
         this->Around[n].push_back(
           { static_cast<int>(other), std::exp(-0.5 * apart * apart / (Width * Width)) });
@@ -61,7 +61,7 @@ Matrix3 LocalDeformation::At(int node, const std::vector<Vector3>& displacement)
     spread += one.weight * from * from.transpose();
     moved += one.weight * (displacement[one.node] - mean) * from.transpose();
   }
-  const double information = 1.0 / (NodeDeviation * NodeDeviation * AlikeNodes);
+  const double information = 1.0 / (NodeDeviation * NodeDeviation * AlikeNeighbours);
   Eigen::Matrix<double, 9, 9> matrix = Eigen::Matrix<double, 9, 9>::Zero();
   Eigen::Matrix<double, 9, 1> right;
   for (int axis = 0; axis < 3; ++axis)

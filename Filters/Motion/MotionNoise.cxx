@@ -13,7 +13,7 @@ namespace coronary
 namespace
 {
 /// Along the vessel, to either side of a place, mm.
-constexpr double Reach = 4.0;
+constexpr double NoiseReach = 4.0;
 /// What the motion of a heart is off a line over twice the reach, mm.
 constexpr double OwnBending = 0.1;
 constexpr double SureConfidence = 0.5;
@@ -44,9 +44,9 @@ std::vector<Triple> TriplesOf(const Polylines& lines)
     for (std::size_t n = 0; n < line.size(); ++n)
     {
       const auto after = static_cast<std::size_t>(
-        std::lower_bound(along.begin(), along.end(), along[n] + Reach) - along.begin());
+        std::lower_bound(along.begin(), along.end(), along[n] + NoiseReach) - along.begin());
       const auto behind = static_cast<std::size_t>(
-        std::upper_bound(along.begin(), along.end(), along[n] - Reach) - along.begin());
+        std::upper_bound(along.begin(), along.end(), along[n] - NoiseReach) - along.begin());
       if (behind > 0 && after < line.size())
       {
         const std::size_t before = behind - 1;

@@ -2,6 +2,7 @@
 
 #include "CyclicTime.h"
 #include "MotionNoise.h"
+#include "Numbers.h"
 #include "Require.h"
 #include "SkeletonPose.h"
 
@@ -36,7 +37,6 @@ using Eigen::Index;
 using Positions = Eigen::Matrix<double, Eigen::Dynamic, 3>; ///< a row an unknown
 using Sparse = Eigen::SparseMatrix<double>;
 
-constexpr double Pi = 3.14159265358979323846;
 /// Weight of a sample of no confidence at all: without it, nothing but smoothness would hold a point.
 constexpr double MinimumWeight = 1e-6;
 /// Gaps between phases that are shorter than this share of the mean one count as so long.

@@ -1,6 +1,7 @@
 #include "PopulationMotion.h"
 
 #include "CyclicTime.h"
+#include "Numbers.h"
 #include "Require.h"
 
 #include <Eigen/Cholesky>
@@ -14,9 +15,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
-constexpr double Degree = Pi / 180.0;
-
 enum Parameter
 {
   RightExcursion,

@@ -45,11 +45,11 @@ vtkStandardNewMacro(vtkCenterlineTracker);
 
 namespace
 {
-enum InputPorts
+enum TrackerPorts
 {
-  SeriesPort = 0,
-  LinesPort = 1,
-  SkeletonPort = 2
+  TrackerSeriesPort = 0,
+  TrackerLinesPort = 1,
+  TrackerSkeletonPort = 2
 };
 
 /// R-R interval in seconds where nothing says it.
@@ -134,8 +134,8 @@ struct vtkCenterlineTracker::Internals
   bool Knows(vtkCenterlineTracker* self, vtkInformationVector** inputs) const
   {
     return this->Known && this->KnownOf == self->GetMTime() &&
-      this->SeriesTime == vtkCoronary::UpstreamTime(Connection(inputs, SeriesPort)) &&
-      this->LinesTime == vtkCoronary::UpstreamTime(Connection(inputs, LinesPort));
+      this->SeriesTime == vtkCoronary::UpstreamTime(Connection(inputs, TrackerSeriesPort)) &&
+      this->LinesTime == vtkCoronary::UpstreamTime(Connection(inputs, TrackerLinesPort));
   }
 };
 
@@ -170,14 +170,14 @@ void vtkCenterlineTracker::RemoveAllTrackedTimes()
 
 int vtkCenterlineTracker::FillInputPortInformation(int port, vtkInformation* info)
 {
-  if (port == SeriesPort)
+  if (port == TrackerSeriesPort)
   {
     info->Append(INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
     info->Append(INPUT_REQUIRED_DATA_TYPE(), "vtkPolyData");
     return 1;
   }
   info->Set(INPUT_REQUIRED_DATA_TYPE(), "vtkPolyData");
-  if (port == SkeletonPort)
+  if (port == TrackerSkeletonPort)
   {
     info->Set(INPUT_IS_OPTIONAL(), 1);
   }
@@ -215,7 +215,7 @@ std::vector<double> vtkCenterlineTracker::Selected(const std::vector<double>& st
 int vtkCenterlineTracker::RequestInformation(
   vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
-  std::vector<double> times = vtkPoseSequences::StepsOf(Connection(inputs, SeriesPort));
+  std::vector<double> times = vtkPoseSequences::StepsOf(Connection(inputs, TrackerSeriesPort));
   try
   {
     if (!times.empty())
@@ -237,7 +237,7 @@ int vtkCenterlineTracker::RequestUpdateExtent(
   vtkCoronary::RequestWholeForFirstPiece(request, inputs, this->GetNumberOfInputPorts(), outputs);
   // Of the series what it has already, or else a step that will be read: the slider's time is not
   // what is needed.
-  vtkInformation* series = Connection(inputs, SeriesPort);
+  vtkInformation* series = Connection(inputs, TrackerSeriesPort);
   const std::vector<double> steps = vtkPoseSequences::StepsOf(series);
   if (this->Data->Known && this->Data->LastAsked.exists)
   {
@@ -247,7 +247,7 @@ int vtkCenterlineTracker::RequestUpdateExtent(
   {
     series->Set(SDDP::UPDATE_TIME_STEP(), steps.front());
   }
-  for (int port = LinesPort; port <= SkeletonPort; ++port)
+  for (int port = TrackerLinesPort; port <= TrackerSkeletonPort; ++port)
   {
     vtkInformation* info = Connection(inputs, port);
     if (info != nullptr && !info->Has(SDDP::TIME_STEPS()))
@@ -261,12 +261,12 @@ int vtkCenterlineTracker::RequestUpdateExtent(
 void vtkCenterlineTracker::Track(vtkInformationVector** inputs)
 {
   using vtkCoronary::Require;
-  vtkInformation* series = Connection(inputs, SeriesPort);
-  vtkPolyData* input = vtkPolyData::GetData(inputs[LinesPort], 0);
+  vtkInformation* series = Connection(inputs, TrackerSeriesPort);
+  vtkPolyData* input = vtkPolyData::GetData(inputs[TrackerLinesPort], 0);
   Internals& data = *this->Data;
   data.Known = false;
   const vtkMTimeType seriesTime = vtkCoronary::UpstreamTime(series);
-  const vtkMTimeType linesTime = vtkCoronary::UpstreamTime(Connection(inputs, LinesPort));
+  const vtkMTimeType linesTime = vtkCoronary::UpstreamTime(Connection(inputs, TrackerLinesPort));
 
   const std::vector<double> steps = vtkPoseSequences::StepsOf(series);
   Require(!steps.empty(), "The series has no time steps");
@@ -377,7 +377,7 @@ int vtkCenterlineTracker::RequestData(
   vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
 {
   vtkInformation* outInfo = outputs->GetInformationObject(0);
-  vtkPolyData* input = vtkPolyData::GetData(inputs[LinesPort], 0);
+  vtkPolyData* input = vtkPolyData::GetData(inputs[TrackerLinesPort], 0);
   vtkPolyData* output[2] = { vtkPolyData::GetData(outputs, 0), vtkPolyData::GetData(outputs, 1) };
   if (outInfo->Get(SDDP::UPDATE_PIECE_NUMBER()) > 0 || input->GetNumberOfPoints() == 0)
   {
@@ -416,7 +416,7 @@ int vtkCenterlineTracker::RequestData(
         output[0]->GetPointData(), names::LumenContrast, data.Sights[phase].contrast);
     }
 
-    vtkInformation* skeletonInfo = Connection(inputs, SkeletonPort);
+    vtkInformation* skeletonInfo = Connection(inputs, TrackerSkeletonPort);
     vtkPolyData* skeleton = skeletonInfo != nullptr ? vtkPolyData::GetData(skeletonInfo) : nullptr;
     if (skeleton != nullptr && skeleton->GetNumberOfPoints() > 0)
     {

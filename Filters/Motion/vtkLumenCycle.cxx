@@ -50,10 +50,10 @@ vtkStandardNewMacro(vtkLumenCycle);
 
 namespace
 {
-enum InputPorts
+enum CyclePorts
 {
-  LinesPort = 0,
-  ImagePort = 1
+  CycleLinesPort = 0,
+  CycleImagePort = 1
 };
 
 constexpr double NotKnown = std::numeric_limits<double>::quiet_NaN();
@@ -127,9 +127,9 @@ struct vtkLumenCycle::Internals
 
   bool Knows(const vtkLumenCycle& self, vtkInformationVector** inputs) const
   {
-    vtkInformation* image = Connection(inputs, ImagePort);
+    vtkInformation* image = Connection(inputs, CycleImagePort);
     return this->Known && this->Blur == self.Blur && this->ImageArrayName == self.ImageArrayName &&
-      this->LinesTime == vtkCoronary::UpstreamTime(Connection(inputs, LinesPort)) &&
+      this->LinesTime == vtkCoronary::UpstreamTime(Connection(inputs, CycleLinesPort)) &&
       this->ImageTime == (image != nullptr ? vtkCoronary::UpstreamTime(image) : 0);
   }
 
@@ -356,10 +356,10 @@ std::vector<double> vtkLumenCycle::GetPhases()
 {
   try
   {
-    vtkInformation* image = this->GetNumberOfInputConnections(ImagePort) > 0
-      ? this->GetInputInformation(ImagePort, 0)
+    vtkInformation* image = this->GetNumberOfInputConnections(CycleImagePort) > 0
+      ? this->GetInputInformation(CycleImagePort, 0)
       : nullptr;
-    return PhasesOf(this->GetInputInformation(LinesPort, 0), image);
+    return PhasesOf(this->GetInputInformation(CycleLinesPort, 0), image);
   }
   catch (const std::invalid_argument&)
   {
@@ -374,8 +374,8 @@ int vtkLumenCycle::GetNumberOfMeasurements() const
 
 int vtkLumenCycle::FillInputPortInformation(int port, vtkInformation* info)
 {
-  info->Set(INPUT_REQUIRED_DATA_TYPE(), port == LinesPort ? "vtkPolyData" : "vtkImageData");
-  if (port == ImagePort)
+  info->Set(INPUT_REQUIRED_DATA_TYPE(), port == CycleLinesPort ? "vtkPolyData" : "vtkImageData");
+  if (port == CycleImagePort)
   {
     info->Set(INPUT_IS_OPTIONAL(), 1);
   }
@@ -395,7 +395,7 @@ int vtkLumenCycle::RequestInformation(
   try
   {
     vtkMovedLines::SetTimes(
-      outputs, PhasesOf(Connection(inputs, LinesPort), Connection(inputs, ImagePort)));
+      outputs, PhasesOf(Connection(inputs, CycleLinesPort), Connection(inputs, CycleImagePort)));
     return 1;
   }
   catch (const std::invalid_argument& error)
@@ -433,8 +433,8 @@ int vtkLumenCycle::RequestUpdateExtent(
       info->Set(SDDP::UPDATE_EXTENT(), whole, 6);
     }
   };
-  ask(LinesPort, this->Data->LinesAsked);
-  ask(ImagePort, this->Data->ImageAsked);
+  ask(CycleLinesPort, this->Data->LinesAsked);
+  ask(CycleImagePort, this->Data->ImageAsked);
   return 1;
 }
 
@@ -442,8 +442,8 @@ void vtkLumenCycle::Measure(vtkInformationVector** inputs)
 {
   Internals& data = *this->Data;
   data.Known = false;
-  vtkInformation* linesInfo = Connection(inputs, LinesPort);
-  vtkInformation* imageInfo = Connection(inputs, ImagePort);
+  vtkInformation* linesInfo = Connection(inputs, CycleLinesPort);
+  vtkInformation* imageInfo = Connection(inputs, CycleImagePort);
   const vtkMTimeType linesTime = vtkCoronary::UpstreamTime(linesInfo);
   const vtkMTimeType imageTime = imageInfo != nullptr ? vtkCoronary::UpstreamTime(imageInfo) : 0;
   std::vector<double> times = PhasesOf(linesInfo, imageInfo);
@@ -543,7 +543,7 @@ int vtkLumenCycle::RequestData(
 {
   vtkInformation* asked = vtkMovedLines::AskedOutput(request, outputs);
   if (asked->Get(SDDP::UPDATE_PIECE_NUMBER()) > 0 ||
-    vtkPolyData::GetData(inputs[LinesPort])->GetNumberOfLines() == 0)
+    vtkPolyData::GetData(inputs[CycleLinesPort])->GetNumberOfLines() == 0)
   {
     return 1;
   }

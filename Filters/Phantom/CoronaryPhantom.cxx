@@ -24,7 +24,7 @@ constexpr std::uint64_t LostPurpose = 301;
 /// A phase counts as the lost one within this distance in time: a third of the paper's step.
 constexpr double LostTolerance = 0.02;
 
-void Require(const char* name, double value, double low, double high)
+void RequireInRange(const char* name, double value, double low, double high)
 {
   if (!(value >= low && value <= high))
   {
@@ -37,41 +37,41 @@ void Require(const char* name, double value, double low, double high)
 
 void PhantomSettings::Validate() const
 {
-  Require("dominance", static_cast<double>(static_cast<int>(this->dominance)), 0, 2);
-  Require("calibre", this->calibre, 0.5, 2.0);
-  Require("positionVariation", this->positionVariation, 0.0, 10.0);
-  Require("calibreVariation", this->calibreVariation, 0.0, 0.3);
-  Require("tortuosity", this->tortuosity, 0.0, 3.0);
-  Require("stenoses", this->stenoses, 0, 20);
-  Require("stenosisDegree", this->stenosisDegree, 0.0, 0.99);
-  Require("calcifiedPlaques", this->calcifiedPlaques, 0, 50);
-  Require("cycleLength", this->cycleLength, 0.3, 3.0);
-  Require("motionAmplitude", this->motionAmplitude, 0.0, 1.3);
-  Require("axialMotionRight", this->axialMotionRight, 0.0, 24.0);
-  Require("axialMotionLeft", this->axialMotionLeft, 0.0, 24.0);
-  Require("regionalLag", this->regionalLag, 0.0, 0.05);
-  Require("regionalAmplitude", this->regionalAmplitude, 0.0, 0.1);
-  Require("beatVariation", this->beatVariation, 0.0, 0.1);
-  Require("beatIrregularity", this->beatIrregularity, 0.0, 5.0);
-  Require("areaPulse", this->areaPulse, 0.0, 0.3);
-  Require("temporalWindow", this->temporalWindow, 0.0, 0.5 * this->cycleLength);
-  Require("noise", this->noise, 0.0, 200.0);
-  Require("noiseCorrelation", this->noiseCorrelation, 0.0, 2.0);
-  Require("systolicNoise", this->systolicNoise, 1.0, 4.0);
+  RequireInRange("dominance", static_cast<double>(static_cast<int>(this->dominance)), 0, 2);
+  RequireInRange("calibre", this->calibre, 0.5, 2.0);
+  RequireInRange("positionVariation", this->positionVariation, 0.0, 10.0);
+  RequireInRange("calibreVariation", this->calibreVariation, 0.0, 0.3);
+  RequireInRange("tortuosity", this->tortuosity, 0.0, 3.0);
+  RequireInRange("stenoses", this->stenoses, 0, 20);
+  RequireInRange("stenosisDegree", this->stenosisDegree, 0.0, 0.99);
+  RequireInRange("calcifiedPlaques", this->calcifiedPlaques, 0, 50);
+  RequireInRange("cycleLength", this->cycleLength, 0.3, 3.0);
+  RequireInRange("motionAmplitude", this->motionAmplitude, 0.0, 1.3);
+  RequireInRange("axialMotionRight", this->axialMotionRight, 0.0, 24.0);
+  RequireInRange("axialMotionLeft", this->axialMotionLeft, 0.0, 24.0);
+  RequireInRange("regionalLag", this->regionalLag, 0.0, 0.05);
+  RequireInRange("regionalAmplitude", this->regionalAmplitude, 0.0, 0.1);
+  RequireInRange("beatVariation", this->beatVariation, 0.0, 0.1);
+  RequireInRange("beatIrregularity", this->beatIrregularity, 0.0, 5.0);
+  RequireInRange("areaPulse", this->areaPulse, 0.0, 0.3);
+  RequireInRange("temporalWindow", this->temporalWindow, 0.0, 0.5 * this->cycleLength);
+  RequireInRange("noise", this->noise, 0.0, 200.0);
+  RequireInRange("noiseCorrelation", this->noiseCorrelation, 0.0, 2.0);
+  RequireInRange("systolicNoise", this->systolicNoise, 1.0, 4.0);
   for (const double sigma : this->pointSpread)
   {
-    Require("pointSpread", sigma, 0.0, 3.0);
+    RequireInRange("pointSpread", sigma, 0.0, 3.0);
   }
-  Require("lumenHU", this->lumenHU, 0.0, 1500.0);
-  Require("attenuationGradient", this->attenuationGradient, -20.0, 5.0);
-  Require("veinHU", this->veinHU, -200.0, 1500.0);
+  RequireInRange("lumenHU", this->lumenHU, 0.0, 1500.0);
+  RequireInRange("attenuationGradient", this->attenuationGradient, -20.0, 5.0);
+  RequireInRange("veinHU", this->veinHU, -200.0, 1500.0);
   for (const LostPhase& phase : this->lostPhases)
   {
-    Require("lostPhases.time", phase.time, -100.0, 100.0);
-    Require("lostPhases.fraction", phase.fraction, 0.0, 1.0);
+    RequireInRange("lostPhases.time", phase.time, -100.0, 100.0);
+    RequireInRange("lostPhases.fraction", phase.fraction, 0.0, 1.0);
   }
-  Require("centerlineSpacing", this->centerlineSpacing, 0.1, 5.0);
-  Require("surfaceSpacing", this->surfaceSpacing, 0.15, 1.5);
+  RequireInRange("centerlineSpacing", this->centerlineSpacing, 0.1, 5.0);
+  RequireInRange("surfaceSpacing", this->surfaceSpacing, 0.15, 1.5);
   this->disease.Validate();
 }
 

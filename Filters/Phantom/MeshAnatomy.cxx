@@ -1,5 +1,6 @@
 #include "MeshAnatomy.h"
 
+#include "Numbers.h"
 #include "Require.h"
 #include "SurfaceCheck.h"
 
@@ -11,7 +12,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 constexpr int TrunkSides = 256;
 constexpr double TrunkHeight = 1e4; ///< mm to both sides: out of every image
 /// What the usual trunk is at least, mm, and how far parts are from its skin.

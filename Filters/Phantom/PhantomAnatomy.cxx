@@ -1,5 +1,6 @@
 #include "PhantomAnatomy.h"
 
+#include "Numbers.h"
 #include "PhantomCollaterals.h"
 #include "PhantomCourses.h"
 #include "PhantomVesselPlans.h"
@@ -16,8 +17,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
-
 /// A healthy vessel's least radius in mm.
 constexpr double MinimumRadius = 0.2;
 

@@ -1,5 +1,6 @@
 #include "PhantomCollaterals.h"
 
+#include "Numbers.h"
 #include "PhantomCourses.h"
 #include "Require.h"
 
@@ -10,10 +11,9 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
-constexpr std::uint64_t Purpose =
-  109;                       ///< of the random numbers, beside those of PhantomAnatomy.cxx
-constexpr double Step = 0.6; ///< mm between two places of the course
+constexpr std::uint64_t CollateralPurpose =
+  109;                             ///< of the random numbers, beside those of PhantomAnatomy.cxx
+constexpr double CourseStep = 0.6; ///< mm between two places of the course
 
 /// An ellipsoid of the heart along which a course runs, heart coordinates.
 struct Layer
@@ -69,7 +69,7 @@ std::vector<Vector3> Course(const PhantomAnatomy& anatomy, const Vector3& start,
   const Vector3 to = layer.Scaled(frame.ToHeart(end));
   const double whole = (end - start).norm();
   const Vector3 aside = from.cross(to).normalized();
-  const int count = std::max(12, static_cast<int>(std::ceil(1.3 * whole / Step)));
+  const int count = std::max(12, static_cast<int>(std::ceil(1.3 * whole / CourseStep)));
   std::vector<Vector3> points;
   for (int i = 0; i <= count; ++i)
   {
@@ -139,7 +139,7 @@ void AddOne(PhantomAnatomy& anatomy, const PhantomSettings& settings, std::size_
   const std::int64_t to = pointOf(wanted.to, wanted.toFraction);
   const PhantomTree& tree = anatomy.tree;
   const double radius = 0.5 * wanted.diameter;
-  RandomStream random(settings.seed, Purpose + 1000 * number);
+  RandomStream random(settings.seed, CollateralPurpose + 1000 * number);
   const std::array<double, 2> phases{ random.Uniform(0.0, 2.0 * Pi),
     random.Uniform(0.0, 2.0 * Pi) };
   PlacedCollateral placed;

@@ -1,5 +1,7 @@
 #include "PhantomCourses.h"
 
+#include "Numbers.h"
+
 #include <cmath>
 #include <utility>
 
@@ -7,8 +9,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
-
 /// Where a vessel hangs, from itself up to its root: vessel, and arc at which the path leaves it.
 std::vector<std::pair<std::size_t, double>> PathToRoot(
   const std::vector<DenseVessel>& vessels, std::size_t v, double arc)

@@ -1,6 +1,7 @@
 #include "PhantomMotion.h"
 
 #include "CounterRandom.h"
+#include "Numbers.h"
 
 #include <Eigen/Geometry>
 
@@ -19,7 +20,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 constexpr std::uint64_t AmplitudePurpose = 201;
 constexpr std::uint64_t BeatPurpose = 202;
 constexpr std::uint64_t ShiftPurpose = 203;

@@ -1,5 +1,6 @@
 #include "PhantomParts.h"
 
+#include "Numbers.h"
 #include "PhantomCourses.h"
 
 #include <algorithm>
@@ -13,8 +14,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
-constexpr double Degree = Pi / 180.0;
 constexpr double LongestShoulder = 4.0; // mm
 constexpr double Cap = 0.15;            // mm of fibrous tissue between the lumen and a lipid core
 constexpr double Thinnest = 0.02;       // mm: what is thinner is left out

@@ -10,16 +10,16 @@ namespace coronary
 {
 namespace
 {
-constexpr double HeartMargin = 25.0; ///< mm around the arteries: what else of the heart moves
-constexpr double FadeWidth = 12.0;   ///< mm over which heart and chest replace each other
-constexpr double HeightStep = 20.0;  ///< mm of the table for which one chest is rendered
-constexpr double IodineStep = 0.02;  ///< change of the iodine for which it is rendered anew
+constexpr double MovingMargin = 25.0; ///< mm around the arteries: what else of the heart moves
+constexpr double FadeWidth = 12.0;    ///< mm over which heart and chest replace each other
+constexpr double HeightStep = 20.0;   ///< mm of the table for which one chest is rendered
+constexpr double IodineStep = 0.02;   ///< change of the iodine for which it is rendered anew
 }
 
 ScannedPhantom::ScannedPhantom(const CoronaryPhantom& phantom)
   : Phantom(phantom)
 {
-  const ImageGrid around = phantom.DefaultGrid(1.0, HeartMargin);
+  const ImageGrid around = phantom.DefaultGrid(1.0, MovingMargin);
   const std::array<int, 6>& e = around.extent;
   this->Heart = { around.IndexToWorld(e[0], e[2], e[4]), around.IndexToWorld(e[1], e[3], e[5]) };
 }

@@ -1,6 +1,7 @@
 #include "ScannerGating.h"
 
 #include "CounterRandom.h"
+#include "Numbers.h"
 #include "Require.h"
 
 #include <algorithm>
@@ -11,7 +12,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 constexpr std::uint64_t BeatPurpose = 401;
 constexpr std::uint64_t SlabPurpose = 402;
 constexpr int BeatsBefore = 2;    ///< views of early phases begin in the beat before

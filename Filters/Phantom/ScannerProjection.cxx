@@ -1,5 +1,6 @@
 #include "ScannerProjection.h"
 
+#include "Numbers.h"
 #include "ScannerKernels.h"
 
 #include <algorithm>
@@ -10,7 +11,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 constexpr int SubRays = 2;     ///< along both sides of a cell, through tubes and balls
 constexpr int Neighbours = 16; ///< detector columns whose rays go side by side
 constexpr int Gathered = 4; ///< columns of voxels on a ray between which its rise is taken as none

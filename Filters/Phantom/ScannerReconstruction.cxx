@@ -1,5 +1,6 @@
 #include "ScannerReconstruction.h"
 
+#include "Numbers.h"
 #include "ScannerKernels.h"
 
 #include <algorithm>
@@ -9,7 +10,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 constexpr int FrequencySteps = 1024;
 constexpr int BlockRows = 4; ///< of pixels that share a pass over the views
 

@@ -1,5 +1,6 @@
 #include "ScannerSettings.h"
 
+#include "Numbers.h"
 #include "Require.h"
 
 #include <cmath>
@@ -8,11 +9,6 @@
 
 namespace coronary
 {
-namespace
-{
-constexpr double Pi = 3.14159265358979323846;
-}
-
 const std::vector<ScannerNumber>& AllScannerNumbers()
 {
   using S = ScannerSettings;

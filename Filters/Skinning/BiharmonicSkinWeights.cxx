@@ -63,7 +63,7 @@ struct RowWeight
 };
 
 /// Of every free row: its weights in the order of the bones.
-using Rows = std::vector<std::vector<RowWeight>>;
+using WeightRows = std::vector<std::vector<RowWeight>>;
 
 /// 1/2 w'Qw and the rest, of one bone after the other.
 double EnergyOf(const SkinWeightSystem& system, const std::vector<std::vector<double>>& weights)
@@ -96,7 +96,7 @@ double EnergyOf(const SkinWeightSystem& system, const std::vector<std::vector<do
 }
 
 /// Divides every row by its sum.
-void Normalize(Rows& rows, SkinWeights& result)
+void Normalize(WeightRows& rows, SkinWeights& result)
 {
   for (std::vector<RowWeight>& row : rows)
   {
@@ -184,7 +184,7 @@ SkinWeights ComputeSkinWeights(const SkinWeightInput& input, const SkinWeightSet
   result.lengthOutside = system.lengthOutside;
   result.fixedPoints = static_cast<std::int64_t>(system.fixed.size()) - system.energy.rows;
 
-  Rows rows(system.energy.rows);
+  WeightRows rows(system.energy.rows);
   if (settings.mode == SkinWeightMode::Joint || settings.mode == SkinWeightMode::Independent)
   {
     SkinWeightOptimizer optimizer(system, settings);

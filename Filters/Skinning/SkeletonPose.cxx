@@ -1,5 +1,6 @@
 #include "SkeletonPose.h"
 
+#include "Numbers.h"
 #include "Require.h"
 
 #include <algorithm>
@@ -544,7 +545,6 @@ void ApplyPoseEdit(const SkeletonRig& rig, const PoseEdit& edit, SkeletonPose& p
   }
   if (edit.calibre != 1.0)
   {
-    constexpr double Pi = 3.14159265358979323846;
     const std::vector<double> distance = DistancesAlong(rig, edit.joint);
     for (std::size_t j = 0; j < distance.size(); ++j)
     {

@@ -1,5 +1,7 @@
 #include "AdaptiveRemesher.h"
 
+#include "Numbers.h"
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -12,7 +14,6 @@ namespace
 constexpr double MinimumFacing = 0.5;
 /// Triangles with a smaller angle are got rid of at the cost of uneven edges, degrees.
 constexpr double HardAngle = 16.0;
-constexpr double Degree = 3.14159265358979323846 / 180.0;
 }
 
 AdaptiveRemesher::AdaptiveRemesher(RemeshSurface& surface, std::vector<RemeshVertex> vertices,

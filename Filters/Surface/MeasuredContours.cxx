@@ -1,5 +1,6 @@
 #include "MeasuredContours.h"
 
+#include "Numbers.h"
 #include "Require.h"
 
 #include <Eigen/Dense>
@@ -14,8 +15,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
-
 /// Relative radii as a series over the angle: 1, cos, sin, cos 2, ...
 using Series = Eigen::VectorXd;
 

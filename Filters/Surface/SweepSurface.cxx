@@ -1,6 +1,7 @@
 #include "SweepSurface.h"
 
 #include "AdaptiveRemesher.h"
+#include "Numbers.h"
 #include "Require.h"
 #include "SweepRescue.h"
 #include "SweptFirstMesh.h"
@@ -19,7 +20,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 /// Retreat of the edges between vessels with which remeshing begins, in radii.
 constexpr double BluntRetreat = 0.6;
 /// Smaller angles are repaired, degrees: a little more than what is promised.

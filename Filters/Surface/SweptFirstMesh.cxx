@@ -1,5 +1,7 @@
 #include "SweptFirstMesh.h"
 
+#include "Numbers.h"
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -8,8 +10,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
-
 /// The first mesh: rings along the spans, junctions between, caps at the ends.
 class FirstMesh
 {

@@ -1,3 +1,4 @@
+#include "Numbers.h"
 #include "SweptLumenBuild.h"
 
 #include <algorithm>
@@ -11,7 +12,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 constexpr int RingSamples = 16;
 /// Tubes bent more than this (radius times curvature) are not meshed ring by ring.
 constexpr double MaximumBend = 0.75;

@@ -1,8 +1,8 @@
+#include "Numbers.h"
 #include "SweptLumenBuild.h"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <stdexcept>
 
@@ -10,7 +10,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 /// Cosine of the angle by which a vessel may bend where others leave it: a tube that bends more has
 /// a fold on its inner side, and is taken as two that meet.
 constexpr double MinimumStraightness = 0.7;

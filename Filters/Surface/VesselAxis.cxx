@@ -1,5 +1,7 @@
 #include "VesselAxis.h"
 
+#include "Numbers.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -7,7 +9,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 using Vector4 = Eigen::Vector4d;
 
 /// Clamped cubic B-spline of four numbers: position and radius.

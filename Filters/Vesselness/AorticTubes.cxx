@@ -1,6 +1,7 @@
 #include "AorticTubes.h"
 
 #include "Median.h"
+#include "Numbers.h"
 
 #include <Eigen/Cholesky>
 
@@ -11,7 +12,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 constexpr double RimGradient = 25.0; ///< HU/mm that make an edge
 constexpr int Rays = 48;
 

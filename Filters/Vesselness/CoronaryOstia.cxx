@@ -2,6 +2,7 @@
 
 #include "AorticTubes.h"
 #include "Median.h"
+#include "Numbers.h"
 #include "OstialOutlets.h"
 #include "Require.h"
 
@@ -15,8 +16,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
-
 /// Log of how much more likely a value is for a coronary artery than for something else: `best` at
 /// the middle, falling with the square of the distance, never below `least`.
 double Evidence(double distance, double width, double best, double minimum)

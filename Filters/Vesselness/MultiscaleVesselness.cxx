@@ -105,7 +105,7 @@ struct RowPiece
 };
 
 /// A box of voxels that one thread filters at once.
-struct Band
+struct RowBand
 {
   int i0;
   int i1;
@@ -116,12 +116,12 @@ struct Band
 };
 
 /// Keeps of a band what holds all that the mask has of it. @return whether that is anything
-bool Shrink(Band& band, const unsigned char* mask, const std::array<int, 6>& part)
+bool Shrink(RowBand& band, const unsigned char* mask, const std::array<int, 6>& part)
 {
   const std::int64_t nx = part[1] - part[0] + 1;
   const std::int64_t ny = part[3] - part[2] + 1;
   const auto isIn = [](unsigned char value) { return value != 0; };
-  Band kept{ part[1] + 1, part[0] - 1, part[3] + 1, part[2] - 1, part[5] + 1, part[4] - 1 };
+  RowBand kept{ part[1] + 1, part[0] - 1, part[3] + 1, part[2] - 1, part[5] + 1, part[4] - 1 };
   for (int k = band.k0; k <= band.k1; ++k)
   {
     for (int j = band.j0; j <= band.j1; ++j)
@@ -165,7 +165,7 @@ public:
   }
 
   /// Derivatives across the slices, of all rows that the band's rows need.
-  void Begin(const Band& band, const ScaleTaps& taps);
+  void Begin(const RowBand& band, const ScaleTaps& taps);
   /// Of a row of the band; valid until the next call.
   HessianRow Row(int y, int k);
   /// Values in a row, with those that fill its last pack.
@@ -188,7 +188,7 @@ private:
   std::int64_t SliceStride;
   const float* End;
   const ScaleTaps* Taps = nullptr;
-  Band Part{};
+  RowBand Part{};
   std::array<int, 3> Reach{}; ///< of the taps
   // What exists of the halo; the rest repeats the border.
   int X0 = 0;
@@ -204,7 +204,7 @@ private:
   std::vector<const float*> Rows;
 };
 
-void BandFilter::Begin(const Band& band, const ScaleTaps& taps)
+void BandFilter::Begin(const RowBand& band, const ScaleTaps& taps)
 {
   this->Part = band;
   this->Taps = &taps;
@@ -448,7 +448,7 @@ void MultiscaleVesselness::ForEachRow(const VoxelBlock& input, const std::array<
       BandFilter filter(input, this->Whole);
       for (std::int64_t unit = first; unit < last; ++unit)
       {
-        Band band{ part[0], part[1], part[2] + static_cast<int>(unit % bands) * bandRows, 0,
+        RowBand band{ part[0], part[1], part[2] + static_cast<int>(unit % bands) * bandRows, 0,
           part[4] + static_cast<int>(unit / bands) * BandSlices, 0 };
         band.j1 = std::min(part[3], band.j0 + bandRows - 1);
         band.k1 = std::min(part[5], band.k0 + BandSlices - 1);

@@ -5,6 +5,7 @@
 #include "HiddenMouths.h"
 #include "Median.h"
 #include "MultiscaleVesselness.h"
+#include "Numbers.h"
 #include "VoxelLattice.h"
 
 #include <Eigen/Cholesky>
@@ -18,8 +19,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
-
 /// A piece of the aortic wall: height over a tangent plane, second order.
 struct WallPatch
 {

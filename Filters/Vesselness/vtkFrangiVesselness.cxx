@@ -1,5 +1,6 @@
 #include "vtkFrangiVesselness.h"
 
+#include "ImageExtent.h"
 #include "LargePages.h"
 #include "MultiscaleVesselness.h"
 #include "vtkCoronaryArrayNames.h"
@@ -32,18 +33,14 @@
 #include <utility>
 #include <vector>
 
+using coronary::Extent;
+using coronary::IsEmpty;
 using coronary::Vector3;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
 namespace
 {
-using Extent = std::array<int, 6>;
 constexpr Extent EmptyExtent = { 0, -1, 0, -1, 0, -1 };
-
-bool IsEmpty(const Extent& e)
-{
-  return e[0] > e[1] || e[2] > e[3] || e[4] > e[5];
-}
 
 bool Contains(const Extent& outer, const Extent& inner)
 {

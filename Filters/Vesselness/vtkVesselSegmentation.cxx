@@ -1,6 +1,7 @@
 #include "vtkVesselSegmentation.h"
 
 #include "CoronaryOstia.h"
+#include "ImageExtent.h"
 #include "LargePages.h"
 #include "MultiscaleVesselness.h"
 #include "VesselSegmentation.h"
@@ -35,6 +36,8 @@
 #include <optional>
 #include <stdexcept>
 
+using coronary::Extent;
+using coronary::IsEmpty;
 using coronary::Vector3;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
@@ -46,23 +49,9 @@ constexpr double MinimumSeedContrast = 4.0;
 constexpr double MinimumSeedVolume = 45.0;
 constexpr double SharedVolume = 10.0;
 
-using Extent = std::array<int, 6>;
-
 // Shares of the work, for the progress.
 constexpr double VesselnessShare = 0.35;
 constexpr double OstiaShare = 0.35;
-
-Extent ExtentOf(vtkImageData* image)
-{
-  Extent e;
-  image->GetExtent(e.data());
-  return e;
-}
-
-bool IsEmpty(const Extent& e)
-{
-  return e[0] > e[1] || e[2] > e[3] || e[4] > e[5];
-}
 
 /// The voxels of an array in one of the types that the algorithms take; else as a float copy.
 class Voxels
@@ -127,7 +116,7 @@ template <typename Array, typename T>
 void Insert(
   vtkImageData* output, const std::string& name, const std::vector<T>& values, const Extent& whole)
 {
-  const Extent part = ExtentOf(output);
+  const Extent part = vtkCoronary::GridOf(output).extent;
   vtkNew<Array> array;
   array->SetName(name.c_str());
   if (!array->Resize(output->GetNumberOfPoints()))

@@ -1,3 +1,4 @@
+#include "Numbers.h"
 #include "SessionPictures.h"
 
 #include "HeartShell.h"
@@ -19,7 +20,6 @@ namespace
 {
 constexpr int SceneSize = 768;
 constexpr std::int64_t SceneTriangles = 40000; // there is no hurry
-constexpr double Degree = 3.14159265358979323846 / 180.0;
 
 void WriteGrey(const GreyImage& image, const std::string& path)
 {

@@ -1,6 +1,7 @@
 #include "ContrastModel.h"
 
 #include "Fnv1a.h"
+#include "Numbers.h"
 #include "Require.h"
 
 #include <algorithm>
@@ -10,14 +11,13 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 constexpr double DepressedFlow = 0.45;  // of the flow before
 constexpr double DepressionTime = 1.9;  // s, of each of two filters
 constexpr double MinimumVolume = 1e-15; // of a slab without length, mL
 constexpr std::size_t CellsOfSlab =
   4; // in the mean; the more, the fewer cells have the end of a slab in them
 
-constexpr RequireOf RequireSetting{ "contrast" };
+constexpr RequireOf RequireContrast{ "contrast" };
 
 const ContrastSettings& Checked(const ContrastSettings& settings)
 {
@@ -30,8 +30,8 @@ void ContrastSettings::Validate() const
 {
   this->flow.Validate();
   this->tracers.Validate();
-  RequireSetting(Within(this->smoothing, 0.0, 20.0), "smoothing", this->smoothing, "0 to 20 mm");
-  RequireSetting(
+  RequireContrast(Within(this->smoothing, 0.0, 20.0), "smoothing", this->smoothing, "0 to 20 mm");
+  RequireContrast(
     Within(this->flowDepression, 0.0, 1.0), "flowDepression", this->flowDepression, "0 to 1");
 }
 
@@ -130,10 +130,10 @@ double ContrastModel::SlabVolume(std::size_t slab) const
 void ContrastModel::Step(
   double dt, double phase, double heartRate, double injection, const CatheterTip& tip)
 {
-  RequireSetting(Within(dt, 0.0005, 0.02), "time step", dt, "0.0005 to 0.02 s");
-  RequireSetting(std::isfinite(phase), "phase", phase, "finite");
-  RequireSetting(Within(heartRate, 0.0, 300.0), "heart rate", heartRate, "0 to 300 per minute");
-  RequireSetting(Within(injection, 0.0, 50.0), "injection", injection, "0 to 50 mL/s");
+  RequireContrast(Within(dt, 0.0005, 0.02), "time step", dt, "0.0005 to 0.02 s");
+  RequireContrast(std::isfinite(phase), "phase", phase, "finite");
+  RequireContrast(Within(heartRate, 0.0, 300.0), "heart rate", heartRate, "0 to 300 per minute");
+  RequireContrast(Within(injection, 0.0, 50.0), "injection", injection, "0 to 50 mL/s");
   if (injection > 0.0 && tip.branch != -1)
   {
     this->Flow_.Network().Locate(tip);

@@ -4,6 +4,7 @@
 #include "CyclicTime.h"
 #include "Fnv1a.h"
 #include "KernelChoice.h"
+#include "Numbers.h"
 #include "Require.h"
 #include "VesselFrames.h"
 
@@ -15,13 +16,12 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 constexpr double DirectionLength = 3.0; // mm over which a branch's direction at a node is taken
 constexpr std::size_t BatchSize = 64;   // of crossings
 constexpr int CellsOfSegment = 64;      // for thinning
 constexpr int Crossings = 1000;         // of segments in a step; more are short of a fault
 
-constexpr RequireOf RequireSetting{ "contrast tracers" };
+constexpr RequireOf RequireTracers{ "contrast tracers" };
 
 /// Part of the flux of laminar flow through the unit circle that is on the side of x below h.
 double ExactFluxBelow(double h)
@@ -147,14 +147,14 @@ KernelChoice<TracerKernels>& TracerKernelChoice()
 
 void ContrastTracerSettings::Validate() const
 {
-  RequireSetting(Within(static_cast<double>(this->capacity), 1000.0, 1e7), "capacity",
+  RequireTracers(Within(static_cast<double>(this->capacity), 1000.0, 1e7), "capacity",
     static_cast<double>(this->capacity), "1000 to 10000000");
-  RequireSetting(Within(this->volume, 1e-7, 0.1), "volume", this->volume, "1e-7 to 0.1 mL");
-  RequireSetting(Within(this->radialDiffusivity, 0.0, 100.0), "radialDiffusivity",
+  RequireTracers(Within(this->volume, 1e-7, 0.1), "volume", this->volume, "1e-7 to 0.1 mL");
+  RequireTracers(Within(this->radialDiffusivity, 0.0, 100.0), "radialDiffusivity",
     this->radialDiffusivity, "0 to 100 mm^2/s");
-  RequireSetting(Within(this->axialDiffusivity, 0.0, 100.0), "axialDiffusivity",
+  RequireTracers(Within(this->axialDiffusivity, 0.0, 100.0), "axialDiffusivity",
     this->axialDiffusivity, "0 to 100 mm^2/s");
-  RequireSetting(
+  RequireTracers(
     Within(this->blushTime, 0.05, 100.0), "blushTime", this->blushTime, "0.05 to 100 s");
 }
 

@@ -3,6 +3,7 @@
 #include "CyclicTime.h"
 #include "Fnv1a.h"
 #include "HeartPressures.h"
+#include "Numbers.h"
 #include "Require.h"
 
 #include <algorithm>
@@ -13,7 +14,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 constexpr double PascalPerMmHg = 133.322387415;
 constexpr double ReferenceLength = 100.0; // mm
 constexpr double OutletLength = 10.0;     // mm before a tip whose mean radius is the outlet's
@@ -21,7 +21,7 @@ constexpr double FlowReserve = 4.0;       // Gould, Lipscomb, Hamilton, Am J Car
 constexpr double ExpansionLoss = 1.52;    // K_t of Seeley and Young
 constexpr int StepsOfCycle = 160;
 
-constexpr RequireOf RequireSetting{ "coronary flow" };
+constexpr RequireOf RequireFlow{ "coronary flow" };
 
 HeartPressures PressuresOf(const CoronaryFlowSettings& settings)
 {
@@ -72,45 +72,42 @@ double MaximumRadius(const std::vector<double>& abscissa, const std::vector<doub
 
 void CoronaryFlowSettings::Validate() const
 {
-  RequireSetting(
-    Within(this->viscosity, 0.5, 20.0), "viscosity", this->viscosity, "0.5 to 20 mPa s");
-  RequireSetting(
-    Within(this->density, 500.0, 2000.0), "density", this->density, "500 to 2000 kg/m^3");
-  RequireSetting(Within(this->systolicPressure, 20.0, 300.0), "systolicPressure",
+  RequireFlow(Within(this->viscosity, 0.5, 20.0), "viscosity", this->viscosity, "0.5 to 20 mPa s");
+  RequireFlow(Within(this->density, 500.0, 2000.0), "density", this->density, "500 to 2000 kg/m^3");
+  RequireFlow(Within(this->systolicPressure, 20.0, 300.0), "systolicPressure",
     this->systolicPressure, "20 to 300 mmHg");
-  RequireSetting(Within(this->diastolicPressure, 10.0, this->systolicPressure), "diastolicPressure",
+  RequireFlow(Within(this->diastolicPressure, 10.0, this->systolicPressure), "diastolicPressure",
     this->diastolicPressure, "10 mmHg to systolicPressure");
-  RequireSetting(this->venousPressure >= -10.0 && this->venousPressure <= 30.0 &&
+  RequireFlow(this->venousPressure >= -10.0 && this->venousPressure <= 30.0 &&
       this->venousPressure < this->diastolicPressure,
     "venousPressure", this->venousPressure, "-10 to 30 mmHg and below diastolicPressure");
-  RequireSetting(
+  RequireFlow(
     Within(this->ejectionBegin, 0.01, 0.15), "ejectionBegin", this->ejectionBegin, "0.01 to 0.15");
-  RequireSetting(Within(this->systoleEnd, 0.2, 0.6), "systoleEnd", this->systoleEnd, "0.2 to 0.6");
-  RequireSetting(Within(this->leftAxialSpeed, 1.0, 200.0), "leftAxialSpeed", this->leftAxialSpeed,
+  RequireFlow(Within(this->systoleEnd, 0.2, 0.6), "systoleEnd", this->systoleEnd, "0.2 to 0.6");
+  RequireFlow(Within(this->leftAxialSpeed, 1.0, 200.0), "leftAxialSpeed", this->leftAxialSpeed,
     "1 to 200 cm/s");
-  RequireSetting(Within(this->rightAxialSpeed, 1.0, 200.0), "rightAxialSpeed",
-    this->rightAxialSpeed, "1 to 200 cm/s");
-  RequireSetting(Within(this->leftDiastolicRatio, 0.3, 5.0), "leftDiastolicRatio",
+  RequireFlow(Within(this->rightAxialSpeed, 1.0, 200.0), "rightAxialSpeed", this->rightAxialSpeed,
+    "1 to 200 cm/s");
+  RequireFlow(Within(this->leftDiastolicRatio, 0.3, 5.0), "leftDiastolicRatio",
     this->leftDiastolicRatio, "0.3 to 5");
-  RequireSetting(Within(this->rightDiastolicRatio, 0.3, 5.0), "rightDiastolicRatio",
+  RequireFlow(Within(this->rightDiastolicRatio, 0.3, 5.0), "rightDiastolicRatio",
     this->rightDiastolicRatio, "0.3 to 5");
-  RequireSetting(
+  RequireFlow(
     Within(this->outletExponent, 1.0, 4.0), "outletExponent", this->outletExponent, "1 to 4");
-  RequireSetting(
+  RequireFlow(
     Within(this->arterialShare, 0.05, 0.95), "arterialShare", this->arterialShare, "0.05 to 0.95");
-  RequireSetting(
-    Within(this->outletTime, 0.02, 5.0), "outletTime", this->outletTime, "0.02 to 5 s");
-  RequireSetting(Within(this->referenceHeartRate, 30.0, 200.0), "referenceHeartRate",
+  RequireFlow(Within(this->outletTime, 0.02, 5.0), "outletTime", this->outletTime, "0.02 to 5 s");
+  RequireFlow(Within(this->referenceHeartRate, 30.0, 200.0), "referenceHeartRate",
     this->referenceHeartRate, "30 to 200 per minute");
-  RequireSetting(Within(this->stenosisThreshold, 0.05, 0.9), "stenosisThreshold",
+  RequireFlow(Within(this->stenosisThreshold, 0.05, 0.9), "stenosisThreshold",
     this->stenosisThreshold, "0.05 to 0.9");
-  RequireSetting(Within(this->stenosisNeighbourhood, 1.0, 100.0), "stenosisNeighbourhood",
+  RequireFlow(Within(this->stenosisNeighbourhood, 1.0, 100.0), "stenosisNeighbourhood",
     this->stenosisNeighbourhood, "1 to 100 mm");
   for (const StatedStenosis& stenosis : this->stenoses)
   {
-    RequireSetting(Within(stenosis.diameterReduction, 0.0, 0.95), "diameterReduction of a stenosis",
+    RequireFlow(Within(stenosis.diameterReduction, 0.0, 0.95), "diameterReduction of a stenosis",
       stenosis.diameterReduction, "0 to 0.95");
-    RequireSetting(Within(stenosis.length, 0.5, 100.0), "length of a stenosis", stenosis.length,
+    RequireFlow(Within(stenosis.length, 0.5, 100.0), "length of a stenosis", stenosis.length,
       "0.5 to 100 mm");
   }
 }
@@ -475,8 +472,7 @@ void CoronaryFlow::Settle(double phase)
 
 void CoronaryFlow::SetOutletFactor(int tree, double factor)
 {
-  RequireSetting(
-    factor > 0.0 && factor < 1e6, "factor of the outlets' resistance", factor, "above 0");
+  RequireFlow(factor > 0.0 && factor < 1e6, "factor of the outlets' resistance", factor, "above 0");
   this->OutletFactor[tree] = factor;
 }
 
@@ -614,10 +610,10 @@ void CoronaryFlow::SetInjector(double injection, const CatheterTip& tip)
 void CoronaryFlow::Step(
   double dt, double phase, double heartRate, double injection, const CatheterTip& tip)
 {
-  RequireSetting(dt > 0.0 && dt < 1e6, "time step", dt, "above 0 s");
-  RequireSetting(std::isfinite(phase), "phase", phase, "finite");
-  RequireSetting(Within(heartRate, 0.0, 1000.0), "heart rate", heartRate, "0 to 1000 per minute");
-  RequireSetting(Within(injection, 0.0, 1000.0), "injection", injection, "0 to 1000 mL/s");
+  RequireFlow(dt > 0.0 && dt < 1e6, "time step", dt, "above 0 s");
+  RequireFlow(std::isfinite(phase), "phase", phase, "finite");
+  RequireFlow(Within(heartRate, 0.0, 1000.0), "heart rate", heartRate, "0 to 1000 per minute");
+  RequireFlow(Within(injection, 0.0, 1000.0), "injection", injection, "0 to 1000 mL/s");
   if (!this->Started)
   {
     this->SetInjector(0.0, tip);

@@ -1,5 +1,7 @@
 #include "FlowNetwork.h"
 
+#include "Numbers.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,8 +13,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
-
 double ConeVolume(double length, double a, double b)
 {
   return 1e-3 * Pi * length * (a * a + a * b + b * b) / 3.0;

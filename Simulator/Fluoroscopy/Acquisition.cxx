@@ -13,7 +13,7 @@ namespace coronary
 {
 namespace
 {
-constexpr RequireOf RequireSetting{ "acquisition" };
+constexpr RequireOf RequireAcquisition{ "acquisition" };
 
 /// A whole number for all three: frames in two seconds.
 std::int64_t FramesInTwoSeconds(FrameRate rate)
@@ -24,13 +24,14 @@ std::int64_t FramesInTwoSeconds(FrameRate rate)
 void RequireRate(const char* name, FrameRate rate)
 {
   const int value = static_cast<int>(rate);
-  RequireSetting(value >= 0 && value <= static_cast<int>(FrameRate::F30), name, value,
+  RequireAcquisition(value >= 0 && value <= static_cast<int>(FrameRate::F30), name, value,
     "one of FrameRate's: 0, 1, 2");
 }
 
 void RequireFieldArea(double area)
 {
-  RequireSetting(area > 0.0 && area <= 5000.0, "area of the field", area, "above 0, to 5000 cm^2");
+  RequireAcquisition(
+    area > 0.0 && area <= 5000.0, "area of the field", area, "above 0, to 5000 cm^2");
 }
 
 template <typename T>
@@ -61,15 +62,15 @@ FrameRate FrameRateOf(double framesPerSecond)
 
 void AcquisitionSettings::Validate() const
 {
-  RequireSetting(this->tickRate >= 100 && this->tickRate <= 100000, "tick rate", this->tickRate,
+  RequireAcquisition(this->tickRate >= 100 && this->tickRate <= 100000, "tick rate", this->tickRate,
     "100 to 100000 Hz");
   RequireRate("frame rate of fluoroscopy", this->fluoroscopyRate);
   RequireRate("frame rate of cine", this->cineRate);
-  RequireSetting(this->fluoroscopyKerma > 0.0 && this->fluoroscopyKerma <= 10.0,
+  RequireAcquisition(this->fluoroscopyKerma > 0.0 && this->fluoroscopyKerma <= 10.0,
     "air kerma of a fluoroscopy frame", this->fluoroscopyKerma, "above 0, to 10 mGy");
-  RequireSetting(this->cineKerma > 0.0 && this->cineKerma <= 10.0, "air kerma of a cine frame",
+  RequireAcquisition(this->cineKerma > 0.0 && this->cineKerma <= 10.0, "air kerma of a cine frame",
     this->cineKerma, "above 0, to 10 mGy");
-  RequireSetting(this->fluoroscopyPhotons >= 1.0 && this->fluoroscopyPhotons <= 1e6,
+  RequireAcquisition(this->fluoroscopyPhotons >= 1.0 && this->fluoroscopyPhotons <= 1e6,
     "photons a pixel", this->fluoroscopyPhotons, "1 to 1e6");
   RequireFieldArea(this->fieldArea);
 }

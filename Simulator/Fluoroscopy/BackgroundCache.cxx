@@ -1,5 +1,6 @@
 #include "BackgroundCache.h"
 
+#include "Numbers.h"
 #include "Require.h"
 
 #include <algorithm>
@@ -358,13 +359,12 @@ bool BackgroundCache::Wait(double seconds) const
 
 CArmGeometry BackgroundCache::Rounded(const CArmGeometry& geometry) const
 {
-  constexpr double pi = 3.14159265358979323846;
   const double angle = this->Data->settings.angleStep;
   const double length = this->Data->settings.lengthStep;
   const auto rounded = [](double value, double step) { return std::round(value / step) * step; };
   CArmPose pose = geometry.Pose();
-  pose.primary = std::clamp(rounded(pose.primary, angle), -pi, pi);
-  pose.secondary = std::clamp(rounded(pose.secondary, angle), -0.5 * pi, 0.5 * pi);
+  pose.primary = std::clamp(rounded(pose.primary, angle), -Pi, Pi);
+  pose.secondary = std::clamp(rounded(pose.secondary, angle), -0.5 * Pi, 0.5 * Pi);
   pose.sourceToIsocentre = std::clamp(rounded(pose.sourceToIsocentre, length), 100.0, 5000.0);
   pose.sourceToDetector =
     std::clamp(rounded(pose.sourceToDetector, length), pose.sourceToIsocentre + length, 10000.0);

@@ -1,5 +1,6 @@
 #include "CArm.h"
 
+#include "Numbers.h"
 #include "Require.h"
 
 #include <cmath>
@@ -8,9 +9,8 @@ namespace coronary
 {
 namespace
 {
-constexpr RequireOf RequireSetting{ "C-arm" };
+constexpr RequireOf RequireCArm{ "C-arm" };
 
-constexpr double Pi = 3.14159265358979323846;
 }
 
 bool CArmPose::operator==(const CArmPose& other) const
@@ -31,22 +31,20 @@ CArmGeometry::CArmGeometry(const CArmPose& pose, const DetectorFormat& format)
   , Format_(format)
 {
   // What is not finite fails every comparison.
-  RequireSetting(std::abs(pose.primary) <= Pi, "primary angle", pose.primary, "within -pi to pi");
-  RequireSetting(
+  RequireCArm(std::abs(pose.primary) <= Pi, "primary angle", pose.primary, "within -pi to pi");
+  RequireCArm(
     std::abs(pose.secondary) <= Pi / 2, "secondary angle", pose.secondary, "within -pi/2 to pi/2");
-  RequireSetting(pose.sourceToIsocentre >= 100.0 && pose.sourceToIsocentre <= 5000.0,
+  RequireCArm(pose.sourceToIsocentre >= 100.0 && pose.sourceToIsocentre <= 5000.0,
     "source to isocentre", pose.sourceToIsocentre, "within 100 to 5000 mm");
-  RequireSetting(pose.sourceToDetector > pose.sourceToIsocentre && pose.sourceToDetector <= 10000.0,
+  RequireCArm(pose.sourceToDetector > pose.sourceToIsocentre && pose.sourceToDetector <= 10000.0,
     "source to detector", pose.sourceToDetector,
     "more than source to isocentre, and at most 10000 mm");
-  RequireSetting(
-    pose.isocentre.norm() < 1e6, "isocentre", pose.isocentre.norm(), "near the patient");
-  RequireSetting(
+  RequireCArm(pose.isocentre.norm() < 1e6, "isocentre", pose.isocentre.norm(), "near the patient");
+  RequireCArm(
     format.columns >= 1 && format.columns <= 8192, "columns", format.columns, "1 to 8192");
-  RequireSetting(format.rows >= 1 && format.rows <= 8192, "rows", format.rows, "1 to 8192");
-  RequireSetting(
-    format.width > 0.0 && format.width <= 2000.0, "width", format.width, "up to 2000 mm");
-  RequireSetting(
+  RequireCArm(format.rows >= 1 && format.rows <= 8192, "rows", format.rows, "1 to 8192");
+  RequireCArm(format.width > 0.0 && format.width <= 2000.0, "width", format.width, "up to 2000 mm");
+  RequireCArm(
     format.height > 0.0 && format.height <= 2000.0, "height", format.height, "up to 2000 mm");
 
   const double sinA = std::sin(pose.primary);

@@ -11,7 +11,7 @@ namespace coronary
 {
 namespace
 {
-constexpr const char* What = "contrast medium";
+constexpr const char* ContrastWords = "contrast medium";
 constexpr double CutOff = 4.0; // sigma
 
 std::vector<TubeSection> SectionsOf(const ContrastBranch& branch, double attenuation)
@@ -23,16 +23,16 @@ std::vector<TubeSection> SectionsOf(const ContrastBranch& branch, double attenua
       " points has " + std::to_string(branch.radii.size()) + " radii and " +
       std::to_string(branch.concentrations.size()) + " concentrations");
   }
-  RequirePoints(What, branch.points);
+  RequirePoints(ContrastWords, branch.points);
   for (const double radius : branch.radii)
   {
-    RequireWithin(What, "a radius (mm)", radius, 0.0, 1000.0);
+    RequireWithin(ContrastWords, "a radius (mm)", radius, 0.0, 1000.0);
   }
   std::vector<TubeSection> sections;
   sections.reserve(branch.concentrations.size());
   for (std::size_t k = 0; k < branch.concentrations.size(); ++k)
   {
-    RequireWithin(What, "a concentration", branch.concentrations[k], 0.0, 1.0);
+    RequireWithin(ContrastWords, "a concentration", branch.concentrations[k], 0.0, 1.0);
     sections.push_back({ { branch.radii[k], branch.radii[k + 1] }, { 0.0, 0.0 },
       attenuation * branch.concentrations[k] });
   }
@@ -64,8 +64,8 @@ int PixelShares(double centre, double sigma, int count, std::vector<float>& shar
 void AddContrast(const std::vector<ContrastBranch>& branches, double attenuation,
   const CArmGeometry& geometry, LineIntegrals& image)
 {
-  RequireFormat(What, geometry, image);
-  RequireWithin(What, "the attenuation (1/mm)", attenuation, 0.0, 1000.0);
+  RequireFormat(ContrastWords, geometry, image);
+  RequireWithin(ContrastWords, "the attenuation (1/mm)", attenuation, 0.0, 1000.0);
   for (const ContrastBranch& branch : branches)
   {
     AddTubes(branch.points, SectionsOf(branch, attenuation), geometry, image);
@@ -75,8 +75,8 @@ void AddContrast(const std::vector<ContrastBranch>& branches, double attenuation
 void AddBlush(const std::vector<ContrastBlush>& clouds, double attenuation,
   const CArmGeometry& geometry, LineIntegrals& image)
 {
-  RequireFormat(What, geometry, image);
-  RequireWithin(What, "the attenuation (1/mm)", attenuation, 0.0, 1000.0);
+  RequireFormat(ContrastWords, geometry, image);
+  RequireWithin(ContrastWords, "the attenuation (1/mm)", attenuation, 0.0, 1000.0);
   const DetectorFormat& format = geometry.Format();
   const double columnSpacing = format.width / format.columns;
   const double rowSpacing = format.height / format.rows;
@@ -84,9 +84,10 @@ void AddBlush(const std::vector<ContrastBlush>& clouds, double attenuation,
   std::vector<float> down;
   for (const ContrastBlush& cloud : clouds)
   {
-    RequireWithin(What, "a cloud's volume (mL)", cloud.volume, 0.0, 1e4);
-    RequireWithin(What, "a cloud's sigma (mm)", cloud.sigma, 1e-3, 1000.0);
-    RequireWithin(What, "a cloud's distance from the origin", cloud.position.norm(), 0.0, 1e6);
+    RequireWithin(ContrastWords, "a cloud's volume (mL)", cloud.volume, 0.0, 1e4);
+    RequireWithin(ContrastWords, "a cloud's sigma (mm)", cloud.sigma, 1e-3, 1000.0);
+    RequireWithin(
+      ContrastWords, "a cloud's distance from the origin", cloud.position.norm(), 0.0, 1e6);
     const Vector3 centre = geometry.Project(cloud.position);
     if (!(centre.z() > CutOff * cloud.sigma))
     {

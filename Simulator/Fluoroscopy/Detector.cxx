@@ -17,7 +17,7 @@ namespace coronary
 {
 namespace
 {
-constexpr RequireOf RequireSetting{ "detector" };
+constexpr RequireOf RequireDetector{ "detector" };
 
 std::vector<float> OpenShares(int count, double before, double after, double transmission)
 {
@@ -240,23 +240,23 @@ float FastLog(float x)
 void DetectorSettings::Validate() const
 {
   // What is not finite fails every comparison.
-  RequireSetting(this->glareFraction >= 0.0 && this->glareFraction <= 0.5, "share of glare",
+  RequireDetector(this->glareFraction >= 0.0 && this->glareFraction <= 0.5, "share of glare",
     this->glareFraction, "0 to 0.5");
-  RequireSetting(this->glareSigma >= 4.0 && this->glareSigma <= 200.0, "width of glare",
+  RequireDetector(this->glareSigma >= 4.0 && this->glareSigma <= 200.0, "width of glare",
     this->glareSigma, "4 to 200 pixels");
-  RequireSetting(
+  RequireDetector(
     this->blurSigma >= 0.0 && this->blurSigma <= 3.0, "blur", this->blurSigma, "0 to 3 pixels");
-  RequireSetting(this->fluoroscopyLag >= 0.0 && this->fluoroscopyLag <= 0.95, "lag in fluoroscopy",
+  RequireDetector(this->fluoroscopyLag >= 0.0 && this->fluoroscopyLag <= 0.95, "lag in fluoroscopy",
     this->fluoroscopyLag, "0 to 0.95");
-  RequireSetting(
+  RequireDetector(
     this->cineLag >= 0.0 && this->cineLag <= 0.95, "lag in cine", this->cineLag, "0 to 0.95");
   const auto shutter = [](const char* name, double value)
-  { RequireSetting(value >= 0.0 && value <= 0.45, name, value, "0 to 0.45 of the image"); };
+  { RequireDetector(value >= 0.0 && value <= 0.45, name, value, "0 to 0.45 of the image"); };
   shutter("left shutter", this->shutters.left);
   shutter("right shutter", this->shutters.right);
   shutter("top shutter", this->shutters.top);
   shutter("bottom shutter", this->shutters.bottom);
-  RequireSetting(this->shutters.transmission >= 0.0 && this->shutters.transmission <= 1.0,
+  RequireDetector(this->shutters.transmission >= 0.0 && this->shutters.transmission <= 1.0,
     "transmission of the shutters", this->shutters.transmission, "0 to 1");
 }
 
@@ -309,8 +309,8 @@ const std::vector<float>& Detector::Expose(const LineIntegrals& first, const Lin
   RequireImage(first);
   RequireSameSize(first, second);
   RequireSameSize(first, third);
-  RequireSetting(photons > 0.0 && photons <= 1e7, "photons a pixel", photons, "above 0, to 1e7");
-  RequireSetting(lag >= 0.0 && lag < 1.0, "lag", lag, "0 to below 1");
+  RequireDetector(photons > 0.0 && photons <= 1e7, "photons a pixel", photons, "above 0, to 1e7");
+  RequireDetector(lag >= 0.0 && lag < 1.0, "lag", lag, "0 to below 1");
   if (first.columns != this->Columns_ || first.rows != this->Rows_)
   {
     this->Resize(first.columns, first.rows);

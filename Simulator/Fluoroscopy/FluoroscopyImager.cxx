@@ -13,7 +13,7 @@ namespace coronary
 {
 namespace
 {
-constexpr RequireOf RequireSetting{ "images" };
+constexpr RequireOf RequireImages{ "images" };
 
 constexpr float MinimumSignal = 0.25F; ///< photons: what is shown as the darkest
 constexpr double HarmonisedWidths =
@@ -51,19 +51,19 @@ std::size_t Bytes(const GreyImage& image)
 void ImagerSettings::Validate() const
 {
   this->detector.Validate();
-  RequireSetting(this->window >= 0.5 && this->window <= 20.0, "window", this->window, "0.5 to 20");
-  RequireSetting(this->level >= -10.0 && this->level <= 10.0, "level", this->level, "-10 to 10");
-  RequireSetting(this->harmonisation >= 0.0 && this->harmonisation <= 0.9, "harmonisation",
+  RequireImages(this->window >= 0.5 && this->window <= 20.0, "window", this->window, "0.5 to 20");
+  RequireImages(this->level >= -10.0 && this->level <= 10.0, "level", this->level, "-10 to 10");
+  RequireImages(this->harmonisation >= 0.0 && this->harmonisation <= 0.9, "harmonisation",
     this->harmonisation, "0 to 0.9");
-  RequireSetting(this->exposureSeconds >= 0.01 && this->exposureSeconds <= 10.0,
+  RequireImages(this->exposureSeconds >= 0.01 && this->exposureSeconds <= 10.0,
     "time constant of the brightness", this->exposureSeconds, "0.01 to 10 s");
-  RequireSetting(this->subtractionWindow >= 0.1 && this->subtractionWindow <= 10.0,
+  RequireImages(this->subtractionWindow >= 0.1 && this->subtractionWindow <= 10.0,
     "window of subtraction", this->subtractionWindow, "0.1 to 10");
-  RequireSetting(this->roadmapOpacity >= 0.0 && this->roadmapOpacity <= 1.0,
+  RequireImages(this->roadmapOpacity >= 0.0 && this->roadmapOpacity <= 1.0,
     "opacity of the roadmap", this->roadmapOpacity, "0 to 1");
-  RequireSetting(this->roadmapThreshold >= 0.0 && this->roadmapThreshold <= 5.0,
+  RequireImages(this->roadmapThreshold >= 0.0 && this->roadmapThreshold <= 5.0,
     "threshold of the roadmap", this->roadmapThreshold, "0 to 5");
-  RequireSetting(this->maskFrames >= 1 && this->maskFrames <= 64, "number of frames of a mask",
+  RequireImages(this->maskFrames >= 1 && this->maskFrames <= 64, "number of frames of a mask",
     this->maskFrames, "1 to 64");
 }
 

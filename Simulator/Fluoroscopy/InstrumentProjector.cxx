@@ -9,25 +9,26 @@ namespace coronary
 {
 namespace
 {
-constexpr const char* What = "instrument";
+constexpr const char* InstrumentWords = "instrument";
 }
 
 void AddInstrument(const InstrumentChain& chain, const CArmGeometry& geometry, LineIntegrals& image)
 {
-  RequireFormat(What, geometry, image);
+  RequireFormat(InstrumentWords, geometry, image);
   if (chain.points.size() != chain.segments.size() + (chain.points.empty() ? 0 : 1))
   {
     throw std::invalid_argument("instrument: " + std::to_string(chain.points.size()) +
       " points do not bound " + std::to_string(chain.segments.size()) + " segments");
   }
-  RequirePoints(What, chain.points);
+  RequirePoints(InstrumentWords, chain.points);
   std::vector<TubeSection> sections;
   sections.reserve(chain.segments.size());
   for (const InstrumentSegment& segment : chain.segments)
   {
-    RequireWithin(What, "an outer radius (mm)", segment.outerRadius, 0.0, 1000.0);
-    RequireWithin(What, "an inner radius (mm)", segment.innerRadius, 0.0, segment.outerRadius);
-    RequireWithin(What, "an attenuation (1/mm)", segment.attenuation, 0.0, 1000.0);
+    RequireWithin(InstrumentWords, "an outer radius (mm)", segment.outerRadius, 0.0, 1000.0);
+    RequireWithin(
+      InstrumentWords, "an inner radius (mm)", segment.innerRadius, 0.0, segment.outerRadius);
+    RequireWithin(InstrumentWords, "an attenuation (1/mm)", segment.attenuation, 0.0, 1000.0);
     sections.push_back({ { segment.outerRadius, segment.outerRadius },
       { segment.innerRadius, segment.innerRadius }, segment.attenuation });
   }

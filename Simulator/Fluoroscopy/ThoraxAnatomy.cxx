@@ -1,6 +1,7 @@
 #include "ThoraxAnatomy.h"
 
 #include "CounterRandom.h"
+#include "Numbers.h"
 #include "PhantomMotion.h"
 
 #include <algorithm>
@@ -10,7 +11,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 constexpr double Midline =
   -20.0; ///< world x of the patient's midline: the left ostium is left of it
 

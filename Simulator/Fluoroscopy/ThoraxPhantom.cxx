@@ -12,7 +12,7 @@ namespace coronary
 {
 namespace
 {
-constexpr RequireOf RequireSetting{ "thorax" };
+constexpr RequireOf RequireThorax{ "thorax" };
 
 constexpr double Below = -208.0; ///< world z of the volume's ends, mm
 constexpr double Above = 148.0;
@@ -357,11 +357,11 @@ private:
 
 void ThoraxSettings::Validate() const
 {
-  RequireSetting(
+  RequireThorax(
     this->spacing >= 0.8 && this->spacing <= 6.0, "spacing", this->spacing, "0.8 to 6 mm");
-  RequireSetting(
+  RequireThorax(
     this->width >= 260.0 && this->width <= 420.0, "width", this->width, "260 to 420 mm");
-  RequireSetting(this->fat >= 4.0 && this->fat <= 40.0, "fat", this->fat, "4 to 40 mm");
+  RequireThorax(this->fat >= 4.0 && this->fat <= 40.0, "fat", this->fat, "4 to 40 mm");
 }
 
 HounsfieldVolume MakeThoraxPhantom(const ThoraxSettings& settings, const ProgressCallback& progress)

@@ -13,8 +13,8 @@ namespace coronary
 {
 namespace
 {
-constexpr const char* What = "surface";
-constexpr double MinimumDepth = 10.0; // mm from the source
+constexpr const char* SurfaceWords = "surface";
+constexpr double NearestDepth = 10.0; // mm from the source
 
 void CheckClosed(const std::vector<Vector3>& points, const std::vector<Triangle>& triangles)
 {
@@ -103,7 +103,7 @@ public:
       nearest = std::min(nearest, this->Seen.back().z());
       farthest = std::max(farthest, this->Seen.back().z());
     }
-    RequireWithin(What, "its distance from the source", nearest, MinimumDepth, 1e7);
+    RequireWithin(SurfaceWords, "its distance from the source", nearest, NearestDepth, 1e7);
     this->Reference = 0.5 * (nearest + farthest) / geometry.Pose().sourceToDetector;
   }
 
@@ -218,9 +218,9 @@ Crossings Balanced(const SurfaceRays& rays, int column, int row)
 void AddSurface(const std::vector<Vector3>& points, const std::vector<Triangle>& triangles,
   double attenuation, const CArmGeometry& geometry, LineIntegrals& image)
 {
-  RequireFormat(What, geometry, image);
-  RequireWithin(What, "the attenuation (1/mm)", attenuation, 0.0, 1000.0);
-  RequirePoints(What, points);
+  RequireFormat(SurfaceWords, geometry, image);
+  RequireWithin(SurfaceWords, "the attenuation (1/mm)", attenuation, 0.0, 1000.0);
+  RequirePoints(SurfaceWords, points);
   CheckClosed(points, triangles);
   if (triangles.empty())
   {

@@ -1,6 +1,7 @@
 #include "CosseratRod.h"
 
 #include "Fnv1a.h"
+#include "Numbers.h"
 
 #include <cmath>
 #include <limits>
@@ -11,7 +12,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Pi = 3.14159265358979323846;
 constexpr int MostRounds = 12;        // in which contacts are added to an iteration
 constexpr double PressDepth = 0.005;  // mm
 constexpr double MinimumCalm = 0.02;  // N/mm

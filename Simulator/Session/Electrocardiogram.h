@@ -24,15 +24,14 @@ inline double ElectrocardiogramAt(double phase)
     double height; // mV
     double width;  // radians
   };
-  constexpr double Pi = 3.14159265358979323846;
-  constexpr std::array<Wave, 5> waves{ Wave{ -Pi / 3.0, 0.12, 0.25 },
-    Wave{ -Pi / 12.0, -0.13, 0.1 }, Wave{ 0.0, 1.1, 0.1 }, Wave{ Pi / 12.0, -0.22, 0.1 },
-    Wave{ Pi / 2.0, 0.28, 0.4 } };
+  constexpr std::array<Wave, 5> waves{ Wave{ -M_PI / 3.0, 0.12, 0.25 },
+    Wave{ -M_PI / 12.0, -0.13, 0.1 }, Wave{ 0.0, 1.1, 0.1 }, Wave{ M_PI / 12.0, -0.22, 0.1 },
+    Wave{ M_PI / 2.0, 0.28, 0.4 } };
   double sum = 0.0;
   for (const Wave& wave : waves)
   {
-    const double turn = phase - wave.angle / (2.0 * Pi);
-    const double away = 2.0 * Pi * (turn - std::round(turn));
+    const double turn = phase - wave.angle / (2.0 * M_PI);
+    const double away = 2.0 * M_PI * (turn - std::round(turn));
     sum += wave.height * std::exp(-0.5 * away * away / (wave.width * wave.width));
   }
   return sum;

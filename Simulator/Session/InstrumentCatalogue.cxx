@@ -3,6 +3,7 @@
 #include "EmbeddedFiles.h"
 #include "InstrumentJson.h"
 #include "JsonFields.h"
+#include "Numbers.h"
 #include "TextFile.h"
 
 #include <algorithm>
@@ -19,7 +20,6 @@ using Json = nlohmann::json;
 
 constexpr double GramForce = 9.80665e-3; // N
 constexpr double Any = std::numeric_limits<double>::max();
-constexpr double Degree = M_PI / 180.0;
 constexpr double CorePoisson = 0.3;
 constexpr double JacketPoisson = 0.45;
 constexpr std::size_t MostInstruments = 1000;

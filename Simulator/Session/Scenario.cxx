@@ -4,6 +4,7 @@
 #include "HandAxes.h"
 #include "InstrumentJson.h"
 #include "JsonFields.h"
+#include "Numbers.h"
 #include "TextFile.h"
 
 #include <algorithm>
@@ -18,7 +19,6 @@ namespace
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-constexpr double Degree = M_PI / 180.0;
 constexpr double MaximumSeed = 9007199254740992.0; // 2^53: every JSON reader holds it exactly
 
 const char* const DominanceNames[] = { "right", "left", "balanced" };

@@ -7,18 +7,17 @@
 
 #include "BoxTree.h"
 #include "NearestOnTriangle.h"
+#include "Numbers.h"
 #include "VesselWall.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <unordered_map>
 
 namespace coronary
 {
 constexpr double MaximumWallCoordinate = 1e5;
-constexpr double Infinity = std::numeric_limits<double>::infinity();
 
 struct WallVertex
 {

@@ -1,5 +1,7 @@
 #include "FluoroscopyWidget.h"
 
+#include "Numbers.h"
+
 #include <QMouseEvent>
 #include <QPainter>
 #include <QWheelEvent>
@@ -11,7 +13,6 @@ namespace coronary
 {
 namespace
 {
-constexpr double Degree = 3.14159265358979323846 / 180.0;
 constexpr double WheelStep = 120.0; // eighths of a degree of a usual wheel's notch
 
 QString TimeText(double seconds)

@@ -19,7 +19,7 @@ std::uint64_t SteadyMicroseconds()
 }
 
 constexpr double MostPeriods = 3.0; // between states that follow each other
-constexpr double Lost = 1e-6 * static_cast<double>(link_times::Lost); // s
+constexpr double LostAfter = 1e-6 * static_cast<double>(link_times::Lost); // s
 
 }
 
@@ -88,7 +88,7 @@ void SerialDevice::Read(std::uint64_t /*tick*/, double secondsPerTick, InputFram
   this->Interpolate(secondsPerTick);
   frame = {};
   frame.axes = this->Latest.axes;
-  frame.state = this->Silence < Lost ? this->Latest.state : DeviceState::Disconnected;
+  frame.state = this->Silence < LostAfter ? this->Latest.state : DeviceState::Disconnected;
   frame.inflation = this->Places[static_cast<std::size_t>(AxisKind::Inflation)];
   SessionInput& input = frame.input;
   AxisPlaces places;
@@ -140,7 +140,7 @@ void SerialDevice::Bridge(double gap)
   for (std::size_t kind = 0; kind < LinkSnapshot::Kinds; ++kind)
   {
     this->Behind[kind] = this->Places[kind] - this->From[kind] - this->Shift[kind];
-    if (gap >= Lost)
+    if (gap >= LostAfter)
     {
       this->Shift[kind] += std::exchange(this->Behind[kind], 0.0);
     }
