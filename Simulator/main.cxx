@@ -67,6 +67,11 @@ void Request::Declare(CLI::App& app)
       "Guide catheter of the built-in catalogue in place of the scenario's")
     ->type_name("NAME")
     ->group(what);
+  app
+    .add_option("--balloon", this->session.balloon,
+      "Balloon of the built-in catalogue in place of the scenario's")
+    ->type_name("NAME")
+    ->group(what);
   auto* heartRate = app
                       .add_option("--heart-rate", this->session.heartRate,
                         "Heart rate at the start in place of the scenario's, beats a minute; 0: "

@@ -172,7 +172,7 @@ def hands_page(complaints):
              "`scripts/make-filter-reference.py`: keys that move forward and back and their speed, the limits of the place, the "
              "tremble of hardware at rest, and the member of [scripts](../simulator-files.md#scripts-of-driving).", "",
              "| axis | keys | speed, 1/s | limits | tremble | script |", "|---|---|---|---|---|---|"]
-    units = {"Millimetre": "mm", "Radian": "rad", "Millilitre": "mL"}
+    units = {"Millimetre": "mm", "Radian": "rad", "Millilitre": "mL", "Atmosphere": "atm"}
     names = {"next": "page down", "prior": "page up"}
     for kind, unit, rest in rows:
         cells = [cell.strip().strip('"') for cell in rest.split(",")]

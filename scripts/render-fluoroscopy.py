@@ -22,6 +22,7 @@ parser.add_argument("session", help="folder that --xray --output wrote")
 parser.add_argument("--seconds", type=float, nargs="+", required=True)
 parser.add_argument("--columns", type=int, default=4)
 parser.add_argument("--shrink", type=int, default=1, help="means of blocks of so many pixels")
+parser.add_argument("--crop", type=int, nargs=3, metavar=("LEFT", "TOP", "SIZE"), help="a square of the frame, pixels")
 parser.add_argument("--output", required=True)
 arguments = parser.parse_args()
 
@@ -39,6 +40,10 @@ def picture(seconds):
     image = reader.GetOutput()
     columns, rows, _ = image.GetDimensions()
     grey = vtk_to_numpy(image.GetPointData().GetScalars()).reshape(rows, columns).astype(float)
+    if arguments.crop:
+        left, top, size = arguments.crop
+        grey = grey[rows - top - size : rows - top, left : left + size]
+        rows, columns = grey.shape
     n = arguments.shrink
     grey = grey[: rows // n * n, : columns // n * n]
     return grey.reshape(rows // n, n, columns // n, n).mean(axis=(1, 3))

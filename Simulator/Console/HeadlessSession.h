@@ -18,6 +18,7 @@ struct HeadlessOptions
   std::string vessels;      ///< folder in place of the scenario's vessels
   std::string wire;         ///< of the built-in catalogue, in place of the scenario's
   std::string catheter;     ///< likewise
+  std::string balloon;      ///< likewise
   std::string replay;       ///< recording to go through
   std::string script;       ///< or script
   std::string record;       ///< recording to write

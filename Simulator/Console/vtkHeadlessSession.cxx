@@ -58,6 +58,16 @@ Json MetricsToJson(const SessionMetrics& metrics, const WallTopology& topology)
       branches.push_back(name);
     }
   }
+  Json events = Json::array();
+  for (const ProcedureEvent& event : metrics.events)
+  {
+    const auto n = static_cast<std::size_t>(event.branch);
+    const bool stretched = event.kind == ProcedureEvent::Kind::OverExpansion;
+    events.push_back({ { "seconds", event.seconds },
+      { "what", stretched ? "over_expansion" : "over_rated_pressure" },
+      { "vessel", n < topology.groupName.size() ? topology.groupName[n] : "" },
+      { stretched ? "diameter_over_reference" : "atm", event.value } });
+  }
   return { { "procedure_s", metrics.procedureSeconds },
     { "fluoroscopy_s", metrics.fluoroscopySeconds }, { "cine_s", metrics.cineSeconds },
     { "frames", metrics.frames }, { "air_kerma_mGy", metrics.airKerma },
@@ -66,7 +76,21 @@ Json MetricsToJson(const SessionMetrics& metrics, const WallTopology& topology)
     { "greatest_tip_force_N", metrics.maximumTipForce },
     { "forceful_tip_s", metrics.forcefulSeconds }, { "wire_travel_mm", metrics.wireTravel },
     { "wire_turning_rad", metrics.wireTurning }, { "deepest_mm", metrics.deepest },
-    { "path", branches } };
+    { "path", branches }, { "events", events } };
+}
+
+Json LesionsToJson(const std::vector<LesionResult>& lesions)
+{
+  Json list = Json::array();
+  for (const LesionResult& one : lesions)
+  {
+    list.push_back({ { "vessel", one.vessel }, { "reference_mm", one.reference },
+      { "least_mm", one.least }, { "stenosis_before_percent", 100.0 * one.degreeBefore },
+      { "stenosis_percent", 100.0 * one.degree }, { "pd_pa", one.pressureRatio },
+      { "ffr_before", one.reserveBefore }, { "ffr", one.reserve },
+      { "greatest_diameter_over_reference", one.stretch } });
+  }
+  return list;
 }
 
 /// Everything that goes into the folder.
@@ -91,6 +115,9 @@ public:
       "outside,branch\n";
     this->Flows = "tick,seconds,injection_mL_s,injected_mL,in_tree_mL,blush_mL,washed_out_mL,"
                   "spilled_mL,aortic_pressure_mmHg,air_kerma_mGy,dose_area_Gy_cm2\n";
+    this->Balloons =
+      "tick,seconds,tip_mm,pressure_atm,least_mm,greatest_mm,hand_force_N,grip_N,wall_atm,"
+      "lesion_least_mm,lesion_percent,pd_pa,flow_mL_s\n";
     this->Tips = "tick,seconds,x_mm,y_mm,z_mm,direction_x,direction_y,direction_z\n";
   }
 
@@ -130,6 +157,7 @@ public:
       session.Contrast().AorticPressure(), session.Metrics().airKerma,
       session.Metrics().doseAreaProduct);
     this->Flows += text;
+    this->AddBalloon(session, seconds);
     const std::vector<Vector3>& line = intervention.Centerline();
     if (line.size() > 1)
     {
@@ -153,6 +181,10 @@ public:
       WriteFileAtomically(this->Folder->Add("frames.csv"), pictures.FrameTable());
     }
     WriteFileAtomically(this->Folder->Add("contrast.csv"), this->Flows);
+    if (this->HasBalloon)
+    {
+      WriteFileAtomically(this->Folder->Add("balloon.csv"), this->Balloons);
+    }
     WriteFileAtomically(this->Folder->Add("trajectory.pvd"), PvdText(this->WireFiles));
     if (this->Wall)
     {
@@ -165,6 +197,32 @@ public:
   }
 
 private:
+  /// With the first lesion and the flow at its vessel's beginning.
+  void AddBalloon(const TrainingSession& session, double seconds)
+  {
+    if (!session.Instruments().Balloon())
+    {
+      return;
+    }
+    this->HasBalloon = true;
+    const BalloonReport& balloon = session.Instruments().Report().balloon;
+    const std::vector<LesionResult> lesions = session.Lesions();
+    const LesionResult first = lesions.empty() ? LesionResult() : lesions.front();
+    int branch = 0;
+    const std::vector<std::string>& names = session.Topology().groupName;
+    while (branch + 1 < static_cast<int>(names.size()) && names[branch] != first.vessel)
+    {
+      ++branch;
+    }
+    char text[320];
+    std::snprintf(text, sizeof(text),
+      "%llu,%.9g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n",
+      static_cast<unsigned long long>(this->Tick), seconds, balloon.tip, balloon.pressure,
+      balloon.least, balloon.greatest, balloon.force, balloon.grip, balloon.wallPressure,
+      first.least, 100.0 * first.degree, first.pressureRatio, session.Contrast().Flow(branch));
+    this->Balloons += text;
+  }
+
   /// What an older session left under our names.
   void TakeOlder(const std::string& folder)
   {
@@ -175,7 +233,7 @@ private:
       const std::string name = entry.path().filename().string();
       if (IsNumbered(name, "wire_", ".vtp") || IsNumbered(name, "wall_", ".vtp") ||
         IsNumbered(name, "xray_", ".png") || IsNumbered(name, "scene_", ".png") ||
-        name == "wall.pvd" || name == "frames.csv")
+        name == "wall.pvd" || name == "frames.csv" || name == "balloon.csv")
       {
         older.push_back(name);
       }
@@ -190,6 +248,8 @@ private:
   std::string Forces;
   std::string Flows;
   std::string Tips;
+  std::string Balloons;
+  bool HasBalloon = false;
   std::uint64_t Tick = 0;
 };
 
@@ -293,6 +353,10 @@ Scenario ScenarioOf(const HeadlessOptions& options)
   {
     scenario.catheter = BuiltInCatalogue().Catheter(options.catheter).catheter;
   }
+  if (!options.balloon.empty())
+  {
+    scenario.balloon = BuiltInCatalogue().Balloon(options.balloon).balloon;
+  }
   if (options.heartRate >= 0.0)
   {
     scenario.settings.heartRate = options.heartRate;
@@ -393,6 +457,12 @@ public:
         1e6 * seconds / static_cast<double>(this->Runner.Tick()),
         static_cast<double>(this->Runner.Tick()) / this->Rate / seconds);
     }
+    for (const LesionResult& one : this->Runner.Session().Lesions())
+    {
+      std::printf("lesion in %s: %.0f %% of %.2f mm, was %.0f %%; FFR %.2f, was %.2f\n",
+        one.vessel.c_str(), 100.0 * one.degree, one.reference, 100.0 * one.degreeBefore,
+        one.reserve, one.reserveBefore);
+    }
     if (this->Replay)
     {
       std::printf("%llu of %llu hashes are equal\n",
@@ -454,6 +524,11 @@ private:
     result["wall"] = { { "points", topology.points }, { "triangles", topology.triangles.size() },
       { "hash", Hexadecimal(this->World.wallHash) } };
     result["metrics"] = MetricsToJson(this->Runner.Session().Metrics(), topology);
+    if (const std::vector<LesionResult> lesions = this->Runner.Session().Lesions();
+        !lesions.empty())
+    {
+      result["lesions"] = LesionsToJson(lesions);
+    }
     result["state_hash_interval"] = RecordedHashInterval;
     result["state_hashes"] = this->Hashes;
     result["last_state_hash"] = Hexadecimal(this->Runner.StateHash());
@@ -586,6 +661,8 @@ void DumpRecording(const std::string& path)
         json["catheter_rad"] = item.input.drive.catheterAngle;
         json["syringe_mL"] = item.input.syringe;
         json["pedals"] = item.input.pedals;
+        json["inflation_atm"] = item.input.drive.inflation;
+        json["balloon_mm"] = item.input.drive.balloonPosition;
         json["primary_rad"] = item.input.primary;
         json["secondary_rad"] = item.input.secondary;
         json["source_to_detector_mm"] = item.input.sourceToDetector;
@@ -637,6 +714,12 @@ void ListInstruments()
   {
     std::printf("catheter  %-16s %4.2f mm  %s\n", one.catheter.name.c_str(),
       2.0 * one.catheter.innerRadius, one.description.c_str());
+  }
+  for (const CatalogueBalloon& one : BuiltInCatalogue().balloons)
+  {
+    std::printf("balloon   %-22s %4.2f mm at %g atm  %s\n", one.balloon.name.c_str(),
+      2.0 * one.balloon.FreeRadius(one.balloon.nominalPressure), one.balloon.nominalPressure,
+      one.description.c_str());
   }
 }
 }

@@ -83,6 +83,13 @@ void WriteInstruments(const std::string& path, const Intervention& intervention,
   AddLine(
     intervention.CatheterLine(), 1, [&](double) { return catheter.outerRadius; }, points, lines,
     radius, abscissa, instruments);
+  std::vector<Vector3> balloon;
+  std::vector<double> radii;
+  intervention.BalloonLine(balloon, radii);
+  std::size_t next = 0;
+  AddLine(
+    balloon, 2, [&](double) { return radii[next++]; }, points, lines, radius, abscissa,
+    instruments);
   data->SetPoints(points);
   data->SetLines(lines);
   data->GetPointData()->AddArray(radius);

@@ -18,8 +18,8 @@ class vtkPolyData;
 namespace coronary
 {
 /**
- * The wire from its tip and the catheter from its tip as two polylines. Point data: MaximumInscribedSphereRadius
- * (that of the instrument, mm), Abscissas (mm from its tip). Cell data: Instrument (0 wire, 1 catheter). Field data:
+ * Wire, catheter and, where there is one out of it, balloon catheter as polylines from their tips. Point data: MaximumInscribedSphereRadius
+ * (that of the instrument, mm), Abscissas (mm from its tip). Cell data: Instrument (0 wire, 1 catheter, 2 balloon). Field data:
  * Tick, PhaseTime, Inserted, and the forces of TickReport.
  * @throws std::runtime_error naming the file
  */

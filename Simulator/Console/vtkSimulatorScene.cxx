@@ -5,6 +5,7 @@
 #include "vtkActor.h"
 #include "vtkCamera.h"
 #include "vtkCellArray.h"
+#include "vtkDoubleArray.h"
 #include "vtkFloatArray.h"
 #include "vtkLight.h"
 #include "vtkPointData.h"
@@ -250,6 +251,10 @@ void vtkSimulatorScene::MakeInstruments(const Scenario& scenario)
   this->CatheterActor->GetProperty()->SetColor(0.93, 0.8, 0.3);
   this->CatheterActor->GetProperty()->SetAmbient(0.35);
   this->CatheterActor->GetProperty()->SetDiffuse(0.7);
+  make(this->BalloonLine, this->BalloonTube, this->BalloonActor, 1.0, 12);
+  this->BalloonTube->SetVaryRadiusToVaryRadiusByAbsoluteScalar();
+  this->BalloonActor->GetProperty()->SetColor(0.55, 0.75, 0.95);
+  this->BalloonActor->GetProperty()->SetAmbient(0.4);
 }
 
 void vtkSimulatorScene::MakeTracers()
@@ -283,6 +288,16 @@ void vtkSimulatorScene::Update(const SessionSnapshot& snapshot)
   }
   SetLine(this->WireLine, snapshot.wire);
   SetLine(this->CatheterLine, snapshot.catheter);
+  if (snapshot.balloon.size() > 1 || this->BalloonLine->GetNumberOfPoints() > 0)
+  {
+    SetLine(this->BalloonLine, snapshot.balloon);
+    vtkNew<vtkDoubleArray> radii;
+    for (const double radius : snapshot.balloonRadii)
+    {
+      radii->InsertNextValue(radius);
+    }
+    this->BalloonLine->GetPointData()->SetScalars(radii);
+  }
   if (this->TracerActor->GetVisibility() != 0)
   {
     const auto count = static_cast<vtkIdType>(snapshot.tracers.size());

@@ -92,6 +92,9 @@ private:
   vtkNew<vtkPolyData> CatheterLine;
   vtkNew<vtkTubeFilter> CatheterTube;
   vtkNew<vtkActor> CatheterActor;
+  vtkNew<vtkPolyData> BalloonLine;
+  vtkNew<vtkTubeFilter> BalloonTube;
+  vtkNew<vtkActor> BalloonActor;
   vtkNew<vtkPolyData> TracerPoints;
   vtkNew<vtkActor> TracerActor;
 };

@@ -114,6 +114,12 @@ public:
   bool Empty() const { return this->Tracers_.Injected() == 0.0; } ///< nothing was ever injected
   std::uint64_t StateHash() const; ///< over the bits of all that the next step depends on
 
+  /// As CoronaryFlow::SetLumen; what tracers count as volume stays.
+  void SetLumen(const std::vector<double>& radius, const std::vector<double>& instrument)
+  {
+    this->Flow_.SetLumen(radius, instrument);
+  }
+
   const CoronaryFlow& FlowModel() const { return this->Flow_; }
   const ContrastTracers& Tracers() const { return this->Tracers_; }
 

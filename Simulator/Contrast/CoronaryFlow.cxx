@@ -5,6 +5,7 @@
 #include "HeartPressures.h"
 #include "Numbers.h"
 #include "Require.h"
+#include "VesselLesions.h"
 
 #include <algorithm>
 #include <cmath>
@@ -20,6 +21,7 @@ constexpr double OutletLength = 10.0;     // mm before a tip whose mean radius i
 constexpr double FlowReserve = 4.0;       // Gould, Lipscomb, Hamilton, Am J Cardiol 1974;33:87
 constexpr double ExpansionLoss = 1.52;    // K_t of Seeley and Young
 constexpr int StepsOfCycle = 160;
+constexpr double ClosedRadius = 0.02; // mm of what an instrument leaves, at least
 
 constexpr RequireOf RequireFlow{ "coronary flow" };
 
@@ -46,6 +48,23 @@ double JetLoss(double density, double area, double throat)
 {
   const double widening = area / throat - 1.0;
   return ExpansionLoss * 0.5 * density * widening * widening / (area * area) / PascalPerMmHg;
+}
+
+/// mm of a free lumen with the same resistance as the annulus around an instrument.
+double AnnulusRadius(double lumen, double instrument)
+{
+  if (instrument <= 0.0)
+  {
+    return lumen;
+  }
+  if (instrument >= 0.999 * lumen)
+  {
+    return ClosedRadius;
+  }
+  const double a = instrument * instrument;
+  const double b = lumen * lumen;
+  const double fourth = (b * b - a * a) - (b - a) * (b - a) / (0.5 * std::log(b / a));
+  return std::max(ClosedRadius, std::pow(std::max(0.0, fourth), 0.25));
 }
 
 const CoronaryFlowSettings& Checked(const CoronaryFlowSettings& settings)
@@ -139,7 +158,15 @@ CoronaryFlow::CoronaryFlow(const WallTopology& topology, const CoronaryFlowSetti
   this->Fraction.assign(trees, 0.0);
   this->OutletFactor.assign(trees, 1.0);
 
-  this->FindStenoses();
+  this->OpenRadius = this->Network_.Topology().axisRadius;
+  if (topology.axisReference.empty())
+  {
+    this->FindStenoses();
+  }
+  else
+  {
+    this->TakeLesions();
+  }
   for (const StatedStenosis& stenosis : settings.stenoses)
   {
     this->AddStatedStenosis(stenosis);
@@ -177,6 +204,7 @@ void CoronaryFlow::FindStenoses()
     const std::vector<double>& radius = network.Topology().axisRadius[b];
     std::vector<double> healthy = radius;
     std::size_t narrowest = s.size(); // of the stretch that we are in
+    std::vector<std::int64_t> points;
     const auto close = [&]
     {
       if (narrowest < s.size())
@@ -184,8 +212,9 @@ void CoronaryFlow::FindStenoses()
         const double area = Pi * healthy[narrowest] * healthy[narrowest];
         const double throat = Pi * radius[narrowest] * radius[narrowest];
         this->Stenoses.push_back({ network.Locate({ static_cast<int>(b), s[narrowest] }).segment,
-          s[narrowest], 0.0, JetLoss(this->Settings_.density, area, throat) });
+          s[narrowest], 0.0, JetLoss(this->Settings_.density, area, throat), area, points });
         narrowest = s.size();
+        points.clear();
       }
     };
     for (std::size_t k = 0; k < s.size(); ++k)
@@ -198,6 +227,7 @@ void CoronaryFlow::FindStenoses()
         continue;
       }
       healthy[k] = reference;
+      points.push_back(network.Branches()[b].firstPoint + static_cast<std::int64_t>(k));
       if (narrowest == s.size() || radius[k] < radius[narrowest])
       {
         narrowest = k;
@@ -205,6 +235,25 @@ void CoronaryFlow::FindStenoses()
     }
     close();
     this->HealthyRadius.push_back(std::move(healthy));
+  }
+}
+
+/// What the vessels are without their lesions is known.
+void CoronaryFlow::TakeLesions()
+{
+  const WallTopology& topology = this->Network_.Topology();
+  this->HealthyRadius = topology.axisReference;
+  for (FoundLesion& lesion : FindLesions(topology, this->Settings_.stenosisThreshold))
+  {
+    const FlowBranch& branch = this->Network_.Branches()[lesion.branch];
+    const auto k = static_cast<std::size_t>(lesion.throat - branch.firstPoint);
+    const double healthy = topology.axisReference[lesion.branch][k];
+    const double radius = topology.axisRadius[lesion.branch][k];
+    const double area = Pi * healthy * healthy;
+    const FlowNetwork::Place place = this->Network_.Locate({ lesion.branch, branch.abscissa[k] });
+    this->Stenoses.push_back({ place.segment, place.abscissa, 0.0,
+      JetLoss(this->Settings_.density, area, Pi * radius * radius), area,
+      std::move(lesion.points) });
   }
 }
 
@@ -221,36 +270,142 @@ void CoronaryFlow::AddStatedStenosis(const StatedStenosis& stenosis)
   const double linear = 32.0 * viscous / (diameter * diameter) *
     (1e-3 * this->Settings_.viscosity) * 1e3 / area / PascalPerMmHg;
   this->Stenoses.push_back({ place.segment, place.abscissa, linear,
-    JetLoss(this->Settings_.density, area, open * open * area) });
+    JetLoss(this->Settings_.density, area, open * open * area), 0.0, {} });
 }
 
 void CoronaryFlow::MeasureResistances()
 {
-  const double factor = PoiseuilleFactor(this->Settings_.viscosity);
-  for (std::size_t b = 0; b < this->Network_.Branches().size(); ++b)
+  this->AlongBranch.resize(this->Network_.Branches().size());
+  for (std::size_t b = 0; b < this->AlongBranch.size(); ++b)
   {
-    const std::vector<double>& s = this->Network_.Branches()[b].abscissa;
-    const std::vector<double>& radius = this->Network_.Topology().axisRadius[b];
-    const std::vector<double>& healthy = this->HealthyRadius[b];
-    BranchResistance along;
-    along.actual.push_back(0.0);
-    along.healthy.push_back(0.0);
-    for (std::size_t k = 1; k < s.size(); ++k)
-    {
-      const double length = s[k] - s[k - 1];
-      along.actual.push_back(
-        along.actual.back() + factor * InverseFourth(length, radius[k - 1], radius[k]));
-      along.healthy.push_back(
-        along.healthy.back() + factor * InverseFourth(length, healthy[k - 1], healthy[k]));
-    }
-    this->AlongBranch.push_back(std::move(along));
+    this->MeasureBranch(b);
   }
+}
+
+void CoronaryFlow::MeasureBranch(std::size_t branch)
+{
+  const double factor = PoiseuilleFactor(this->Settings_.viscosity);
+  const std::vector<double>& s = this->Network_.Branches()[branch].abscissa;
+  const std::vector<double>& radius = this->OpenRadius[branch];
+  const std::vector<double>& healthy = this->HealthyRadius[branch];
+  BranchResistance& along = this->AlongBranch[branch];
+  along.actual.assign(s.size(), 0.0);
+  along.healthy.assign(s.size(), 0.0);
+  for (std::size_t k = 1; k < s.size(); ++k)
+  {
+    const double length = s[k] - s[k - 1];
+    along.actual[k] =
+      along.actual[k - 1] + factor * InverseFourth(length, radius[k - 1], radius[k]);
+    along.healthy[k] =
+      along.healthy[k - 1] + factor * InverseFourth(length, healthy[k - 1], healthy[k]);
+  }
+}
+
+void CoronaryFlow::SetLumen(
+  const std::vector<double>& radius, const std::vector<double>& instrument)
+{
+  std::vector<char> changed(this->OpenRadius.size(), 0);
+  const auto branchOf = [&](std::int64_t point)
+  {
+    std::size_t b = 0;
+    while (b + 1 < this->OpenRadius.size() && this->Network_.Branches()[b + 1].firstPoint <= point)
+    {
+      ++b;
+    }
+    return b;
+  };
+  std::size_t point = 0;
+  for (std::size_t b = 0; b < this->OpenRadius.size(); ++b)
+  {
+    for (double& open : this->OpenRadius[b])
+    {
+      const double now = AnnulusRadius(radius.at(point), instrument.at(point));
+      changed[b] |= now != open ? 1 : 0;
+      open = now;
+      ++point;
+    }
+    if (changed[b] != 0)
+    {
+      this->MeasureBranch(b);
+    }
+  }
+  for (Stenosis& stenosis : this->Stenoses)
+  {
+    double least = 1e9;
+    for (const std::int64_t one : stenosis.points)
+    {
+      const std::size_t b = branchOf(one);
+      least = std::min(least, this->OpenRadius[b][one - this->Network_.Branches()[b].firstPoint]);
+    }
+    if (stenosis.points.empty())
+    {
+      continue;
+    }
+    // Nothing makes a jet where an instrument fills the lumen, or where it is wide.
+    const double throat = Pi * least * least;
+    const bool jet = throat < stenosis.area && least > 2.0 * ClosedRadius;
+    stenosis.quadratic = jet ? JetLoss(this->Settings_.density, stenosis.area, throat) : 0.0;
+    changed[this->Network_.Segments()[stenosis.segment].branch] = 1;
+  }
+  for (std::size_t s = 0; s < this->Losses.size(); ++s)
+  {
+    const FlowSegment& segment = this->Network_.Segments()[s];
+    if (changed[segment.branch] != 0)
+    {
+      this->Losses[s] = this->LossBetween(static_cast<int>(s), segment.from, segment.to);
+    }
+  }
+}
+
+double CoronaryFlow::PressureAt(const CatheterTip& place) const
+{
+  const FlowNetwork::Place here = this->Network_.Locate(place);
+  const FlowSegment& segment = this->Network_.Segments()[here.segment];
+  const Loss loss = this->LossBetween(here.segment, segment.from, here.abscissa);
+  const double flow = this->FlowAtBeginning(here.segment);
+  return this->Pressure_[segment.above] - loss.linear * flow -
+    loss.quadratic * std::abs(flow) * flow;
+}
+
+double CoronaryFlow::MeanAorticPressure() const
+{
+  double mean = 0.0;
+  for (int k = 0; k < StepsOfCycle; ++k)
+  {
+    mean += AorticPressure(this->Settings_, (k + 1.0) / StepsOfCycle) / StepsOfCycle;
+  }
+  return mean;
+}
+
+double CoronaryFlow::FlowReserveAt(const CatheterTip& place) const
+{
+  constexpr int MostSteps = 200;
+  CoronaryFlow steady = *this;
+  steady.SetInjector(0.0, {});
+  for (double& resistance : steady.OutletResistance_)
+  {
+    resistance /= FlowReserve;
+  }
+  const double aortic = this->MeanAorticPressure();
+  double pressure = 0.0;
+  for (int k = 0; k < MostSteps; ++k)
+  {
+    steady.SolveSteady(aortic);
+    const double before = pressure;
+    pressure = steady.PressureAt(place);
+    if (std::abs(pressure - before) < 1e-12 * aortic)
+    {
+      break;
+    }
+  }
+  return pressure / aortic;
 }
 
 double CoronaryFlow::ResistanceTo(int branch, double abscissa) const
 {
   const std::vector<double>& s = this->Network_.Branches()[branch].abscissa;
   const std::vector<double>& along = this->AlongBranch[branch].actual;
+  const std::vector<double>& radius = this->OpenRadius[branch];
   if (abscissa >= s.back())
   {
     return along.back();
@@ -259,8 +414,8 @@ double CoronaryFlow::ResistanceTo(int branch, double abscissa) const
     static_cast<std::size_t>(std::upper_bound(s.begin() + 1, s.end(), abscissa) - s.begin()) - 1;
   return along[k] +
     PoiseuilleFactor(this->Settings_.viscosity) *
-    InverseFourth(abscissa - s[k], this->Network_.Topology().axisRadius[branch][k],
-      this->Network_.RadiusAt(branch, abscissa));
+    InverseFourth(abscissa - s[k], radius[k],
+      radius[k] + (abscissa - s[k]) / (s[k + 1] - s[k]) * (radius[k + 1] - radius[k]));
 }
 
 CoronaryFlow::Loss CoronaryFlow::LossBetween(int segment, double from, double to) const
@@ -357,11 +512,7 @@ void CoronaryFlow::CalibrateMean(int tree, double target)
 {
   const std::size_t nodes = this->Network_.Nodes().size();
   const std::vector<FlowSegment>& segments = this->Network_.Segments();
-  double aortic = 0.0;
-  for (int k = 0; k < StepsOfCycle; ++k)
-  {
-    aortic += AorticPressure(this->Settings_, (k + 1.0) / StepsOfCycle) / StepsOfCycle;
-  }
+  const double aortic = this->MeanAorticPressure();
   const auto speed = [&](double scale)
   {
     for (std::size_t n = 0; n < nodes; ++n)

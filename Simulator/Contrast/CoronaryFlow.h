@@ -136,6 +136,21 @@ public:
   /// All outlets' resistances of a tree times this from the next step on (> 0).
   void SetOutletFactor(int tree, double factor);
 
+  ///@{
+  /**
+   * The lumen is another one from the next step on; outlets stay as they are calibrated. What lies in it leaves an annulus:
+   * r^4 of Poiseuille's law becomes (b^4 - a^4) - (b^2 - a^2)^2 / ln(b / a), b the lumen's radius, a the instrument's.
+   * @param radius      mm, per point of the axes in one list
+   * @param instrument  mm, likewise; 0: none
+   */
+  void SetLumen(const std::vector<double>& radius, const std::vector<double>& instrument);
+  /// mmHg now, at a place.
+  double PressureAt(const CatheterTip& place) const;
+  /// Fractional flow reserve: mean pressure at a place over the aortic one in steady flow, with the outlets' resistance a
+  /// quarter of what it is at rest (hyperaemia).
+  double FlowReserveAt(const CatheterTip& place) const;
+  ///@}
+
   /// Over the bits of all that the next step depends on. @param before  the digest to go on from
   std::uint64_t StateHash(std::uint64_t before) const;
 
@@ -144,8 +159,10 @@ private:
   {
     int segment;
     double abscissa;
-    double linear;    ///< mmHg s/mL, beyond the axis' own
-    double quadratic; ///< mmHg s^2/mL^2
+    double linear;                    ///< mmHg s/mL, beyond the axis' own
+    double quadratic;                 ///< mmHg s^2/mL^2
+    double area = 0.0;                ///< mm^2 without it; 0: stated
+    std::vector<std::int64_t> points; ///< of the axes, in one list, that it takes
   };
   /// Of a branch's axis without its stenoses, and with them.
   struct BranchResistance
@@ -167,6 +184,9 @@ private:
   };
 
   void FindStenoses();
+  void TakeLesions();
+  void MeasureBranch(std::size_t branch);
+  double MeanAorticPressure() const;
   void AddStatedStenosis(const StatedStenosis& stenosis);
   void MeasureResistances();
   double ResistanceTo(int branch, double abscissa) const;
@@ -187,6 +207,7 @@ private:
   CoronaryFlowSettings Settings_;
   FlowNetwork Network_;
   std::vector<std::vector<double>> HealthyRadius; ///< mm, per branch and axis point
+  std::vector<std::vector<double>> OpenRadius;    ///< mm, likewise: what blood has of the lumen now
   std::vector<BranchResistance> AlongBranch;
   std::vector<Stenosis> Stenoses;
   std::vector<Loss> Losses; ///< per segment; the calibration's are without stenoses

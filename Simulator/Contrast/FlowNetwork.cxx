@@ -133,6 +133,7 @@ FlowNetwork::FlowNetwork(const WallTopology& topology, const std::vector<Coronar
   this->Topology_.axisRadius = topology.axisRadius;
   this->Topology_.parent = topology.parent;
   this->Topology_.groupName = topology.groupName;
+  this->Topology_.axisReference = topology.axisReference;
   this->Topology_.groupName.resize(topology.axis.size());
   this->MeasureBranches();
   this->Connect();

@@ -105,7 +105,7 @@ private:
   void Connect();
   void ChooseSides(const std::vector<CoronarySide>& sides);
 
-  WallTopology Topology_; ///< axis, radii, parents and names only
+  WallTopology Topology_; ///< axis, radii, parents and names
   std::vector<FlowBranch> Branches_;
   std::vector<FlowSegment> Segments_;
   std::vector<FlowNode> Nodes_;

@@ -27,7 +27,6 @@ enum class DeviceState : std::uint8_t
 struct InputFrame
 {
   SessionInput input;        ///< pedals are 0 unless state is Running or Stale
-  double inflation = 0.0;    ///< atm, of an indeflator
   std::uint32_t buttons = 0; ///< as the device numbers them
   std::uint32_t axes = 0;    ///< bits of DeviceAxes that it has
   DeviceState state = DeviceState::Connecting;

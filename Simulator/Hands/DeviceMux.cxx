@@ -18,7 +18,7 @@ struct GroupPlaces
   std::size_t end;
 };
 constexpr std::array<GroupPlaces, DeviceMux::Groups> GroupTable{ { { WireAxes, 0, 2 },
-  { CatheterAxes, 2, 4 }, { SyringeAxis, 4, 5 }, { ViewAxes, 5, 11 } } };
+  { CatheterAxes, 2, 4 }, { SyringeAxis, 4, 5 }, { ViewAxes, 5, 11 }, { BalloonAxes, 11, 13 } } };
 
 double Limited(double value, const HandAxis& axis)
 {

@@ -42,7 +42,7 @@ class DeviceMux
 {
 public:
   static constexpr double RestSeconds = 0.5;
-  static constexpr std::size_t Groups = 4; ///< wire, catheter, syringe, view
+  static constexpr std::size_t Groups = 5; ///< wire, catheter, syringe, view, balloon
 
   /// Before the first Next(). The order is that of priority: hardware, gamepad, keyboard.
   void Add(std::shared_ptr<Device> device);
@@ -95,7 +95,7 @@ private:
 
   std::vector<std::shared_ptr<Device>> All;
   std::vector<Source> Sources;
-  std::array<std::atomic<int>, Groups> Owner{ { { -1 }, { -1 }, { -1 }, { -1 } } };
+  std::array<std::atomic<int>, Groups> Owner{ { { -1 }, { -1 }, { -1 }, { -1 }, { -1 } } };
   std::array<bool, Groups> Held{};  ///< its device is lost
   std::array<bool, Groups> Begun{}; ///< has followed a device
   AxisPlaces Now = PlacesOf(SessionInput());

@@ -6,12 +6,13 @@ AxisPlaces PlacesOf(const SessionInput& input)
 {
   return { input.drive.wirePosition, input.drive.wireAngle, input.drive.catheterPosition,
     input.drive.catheterAngle, input.syringe, input.primary, input.secondary,
-    input.sourceToDetector, input.table.x(), input.table.y(), input.table.z() };
+    input.sourceToDetector, input.table.x(), input.table.y(), input.table.z(),
+    input.drive.inflation, input.drive.balloonPosition };
 }
 
 void SetPlaces(SessionInput& input, const AxisPlaces& places)
 {
-  input.drive = { places[0], places[1], places[2], places[3] };
+  input.drive = { places[0], places[1], places[2], places[3], places[11], places[12] };
   input.syringe = places[4];
   input.primary = places[5];
   input.secondary = places[6];

@@ -39,8 +39,10 @@ enum class AxisKind : std::uint8_t
   TableLeft = 9,
   TableBack = 10,
   TableHead = 11,
-  Inflation = 12 ///< known to the protocol; moves nothing
+  Inflation = 12,
+  BalloonAdvance = 13
 };
+constexpr AxisKind LastAxisKind = AxisKind::BalloonAdvance;
 
 /// What one device moves at a time; bits.
 enum DeviceAxes : std::uint32_t
@@ -49,7 +51,8 @@ enum DeviceAxes : std::uint32_t
   CatheterAxes = 2U,
   SyringeAxis = 4U,
   ViewAxes = 8U, ///< C-arm and table
-  AllAxes = 15U
+  BalloonAxes = 16U,
+  AllAxes = 31U
 };
 
 struct HandAxis
@@ -73,7 +76,7 @@ struct HandAxis
 
 constexpr double DegreeOfHands = M_PI / 180.0;
 constexpr double Anywhere = 1e300;
-constexpr std::size_t HandAxes = 11;
+constexpr std::size_t HandAxes = 13;
 
 constexpr std::array<HandAxis, HandAxes> HandAxisTable{ {
   { AxisKind::WireAdvance, AxisUnit::Millimetre, WireAxes, -Anywhere, Anywhere, 0.2, 2000.0, 10.0,
@@ -98,6 +101,10 @@ constexpr std::array<HandAxis, HandAxes> HandAxisTable{ {
     "table_y", "table_y_mm", 1.0, 1000.0, "next", "prior" },
   { AxisKind::TableHead, AxisUnit::Millimetre, ViewAxes, -200.0, 200.0, 1.0, 2000.0, 40.0, false,
     "table_z", "table_z_mm", 1.0, 1000.0, "t", "g" },
+  { AxisKind::Inflation, AxisUnit::Atmosphere, BalloonAxes, -0.9, 30.0, 0.05, 200.0, 2.0, false,
+    "inflation", "inflate_atm", 1.0, 100.0, "b", "v" },
+  { AxisKind::BalloonAdvance, AxisUnit::Millimetre, BalloonAxes, -Anywhere, Anywhere, 0.2, 2000.0,
+    10.0, true, "balloon_position", "balloon_mm", 1.0, 1e6, "e", "q" },
 } };
 
 /// A place, a speed or a wish for each axis.
@@ -105,7 +112,7 @@ using AxisPlaces = std::array<double, HandAxes>;
 
 constexpr std::size_t IndexOf(AxisKind kind)
 {
-  return static_cast<std::size_t>(kind) - 1; // of the table; none for None and Inflation
+  return static_cast<std::size_t>(kind) - 1; // of the table; none for None
 }
 
 /// @return null: no hand's

@@ -145,6 +145,8 @@ public:
   double Lag(std::int64_t i) const { return this->Bodies[i].lag; } ///< rad, see HangOnSpring
   /// From now on the segment moves by the forces on it.
   void Release(std::int64_t i);
+  /// Of what touches, mm.
+  void SetRadius(std::int64_t i, double radius) { this->Bodies[i].segment.radius = radius; }
   void SetVelocity(std::int64_t i, const Vector3& velocity, const Vector3& turning);
 
   ///@{

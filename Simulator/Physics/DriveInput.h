@@ -15,6 +15,8 @@ struct DriveInput
   double catheterPosition =
     0.0;                      ///< mm the catheter's tip is advanced into the vessel since the start
   double catheterAngle = 0.0; ///< radians
+  double inflation = 0.0;     ///< atm at the balloon's inflator
+  double balloonPosition = 0.0; ///< mm the balloon is advanced since the start
 };
 }
 

@@ -114,4 +114,93 @@ void GuideCatheter::Validate() const
     throw std::invalid_argument(whose + text);
   }
 }
+
+void BalloonCatheter::Validate() const
+{
+  const std::string whose = "Balloon '" + this->name + "'";
+  Require(this->length, 4.0, 60.0, whose, "the length", "mm");
+  Require(this->tipLength, 1.0, 30.0, whose, "the tip's length", "mm");
+  Require(this->shoulder, 0.1, this->tipLength, whose, "the shoulder", "mm");
+  Require(this->crossingRadius, 0.2, 1.5, whose, "the crossing radius", "mm");
+  Require(this->tipRadius, 0.15, this->crossingRadius, whose, "the tip's radius", "mm");
+  Require(this->shaftRadius, 0.2, 1.5, whose, "the shaft's radius", "mm");
+  Require(this->monorail, this->Reach() + 1.0, 2000.0, whose, "the monorail", "mm");
+  Require(this->markerLength, 0.1, 5.0, whose, "the marker's length", "mm");
+  Require(this->nominalPressure, 1.0, 40.0, whose, "the nominal pressure", "atm");
+  Require(this->ratedPressure, this->nominalPressure, 40.0, whose, "the rated pressure", "atm");
+  Require(this->tipStiffness, 0.0, 1e3, whose, "the tip's stiffness", "N mm^2");
+  Require(this->balloonStiffness, 0.0, 1e3, whose, "the balloon's stiffness", "N mm^2");
+  Require(this->shaftStiffness, 0.0, 1e3, whose, "the shaft's stiffness", "N mm^2");
+  Require(this->filmStiffness, 0.0, 1e3, whose, "the film's stiffness", "N/mm");
+  Require(this->pushStiffness, 1e-3, 1e3, whose, "the push stiffness", "N/mm");
+  Require(this->wireFriction, 0.0, 5.0, whose, "the friction on the wire", "N");
+  Require(this->inflatedFriction, 0.0, 5.0, whose, "the friction on the wire when inflated", "N");
+  Require(this->friction, 0.0, 2.0, whose, "the friction", "");
+  Require(this->inflationResistance, 0.1, 1e4, whose, "the inflation resistance", "atm s/mL");
+  Require(this->fillFraction, 0.0, 1.0, whose, "the part of contrast medium", "");
+  RequirePieces(this->compliance.size(), 2, whose, "rows of compliance");
+  double before = 2.0 * this->crossingRadius;
+  double pressure = 0.0;
+  for (std::size_t n = 0; n < this->compliance.size(); ++n)
+  {
+    const std::string part = whose + ", row " + std::to_string(n + 1) + " of its compliance";
+    const ComplianceRow& row = this->compliance[n];
+    Require(row.pressure, pressure + 1e-3, 40.0, part, "the pressure", "atm");
+    Require(row.diameter, before, 10.0, part, "the diameter", "mm");
+    pressure = row.pressure;
+    before = row.diameter;
+  }
+}
+
+double BalloonCatheter::FreeRadius(double pressure) const
+{
+  if (!(pressure > 0.0))
+  {
+    return this->crossingRadius;
+  }
+  ComplianceRow low{ 0.0, 2.0 * this->crossingRadius };
+  ComplianceRow high = this->compliance.front();
+  for (std::size_t n = 1; n < this->compliance.size() && pressure > high.pressure; ++n)
+  {
+    low = high;
+    high = this->compliance[n]; // the last slope goes on
+  }
+  const double share = (pressure - low.pressure) / (high.pressure - low.pressure);
+  return 0.5 * (low.diameter + share * (high.diameter - low.diameter));
+}
+
+double BalloonCatheter::Shape(double behind) const
+{
+  const double before = this->tipLength - behind;
+  const double after = behind - this->tipLength - this->length;
+  const double beyond = std::max({ 0.0, before, after }) / this->shoulder;
+  return beyond < 1.0 ? 0.5 * (1.0 + std::cos(M_PI * beyond)) : 0.0;
+}
+
+double BalloonCatheter::FoldedRadius(double behind) const
+{
+  if (behind < 0.0)
+  {
+    return 0.0;
+  }
+  const double tip = std::min(1.0, behind / this->tipLength);
+  const double back =
+    std::clamp((behind - this->tipLength - this->length) / this->shoulder, 0.0, 1.0);
+  const double front = this->tipRadius + tip * (this->crossingRadius - this->tipRadius);
+  return front + back * (this->shaftRadius - this->crossingRadius);
+}
+
+double BalloonCatheter::BendingStiffness(double behind, double pressure, double radius) const
+{
+  if (behind < 0.0)
+  {
+    return 0.0;
+  }
+  const double shape = this->Shape(behind);
+  const double beside = behind < this->Middle() ? this->tipStiffness : this->shaftStiffness;
+  // The film carries once it is taut.
+  const double taut = std::clamp(pressure / this->compliance.front().pressure, 0.0, 1.0);
+  const double film = this->filmStiffness * M_PI * radius * radius * radius;
+  return (1.0 - shape) * beside + shape * (this->balloonStiffness + taut * film);
+}
 }

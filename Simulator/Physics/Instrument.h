@@ -1,6 +1,6 @@
 /**
  * @file Instrument.h
- * @brief Guidewires and guide catheters as their mechanics.
+ * @brief Guidewires, guide catheters and balloon catheters as their mechanics.
  */
 #ifndef DynamicCoronary_Instrument_h
 #define DynamicCoronary_Instrument_h
@@ -91,6 +91,59 @@ struct GuideCatheter
 
   /// @throws std::invalid_argument naming the catheter and the property
   void Validate() const;
+};
+
+/// Of a balloon in air.
+struct ComplianceRow
+{
+  double pressure = 0.0; ///< atm
+  double diameter = 0.0; ///< mm
+};
+
+/// A balloon catheter that runs on the wire, from its tip: tip, balloon between two markers, shaft.
+struct BalloonCatheter
+{
+  std::string name;
+  std::string source;
+  double length = 0.0;          ///< mm of the balloon's even part
+  double tipLength = 0.0;       ///< mm before it
+  double shoulder = 0.0;        ///< mm of its cones
+  double tipRadius = 0.0;       ///< mm at the very tip, outside
+  double crossingRadius = 0.0;  ///< mm, folded: of the crossing profile
+  double shaftRadius = 0.0;     ///< mm, outside
+  double monorail = 0.0;        ///< mm of the wire's lumen from the tip
+  double markerLength = 0.0;    ///< mm of its two marker bands, at the ends of the even part
+  double nominalPressure = 0.0; ///< atm
+  double ratedPressure = 0.0;   ///< atm
+  std::vector<ComplianceRow> compliance; ///< rising
+
+  double tipStiffness = 0.0;     ///< EI, N mm^2, before the balloon
+  double balloonStiffness = 0.0; ///< EI, folded
+  double shaftStiffness = 0.0;   ///< EI
+  double filmStiffness = 0.0;    ///< modulus times thickness of the film, N/mm: EI = pi r^3 of that
+  double pushStiffness = 0.0;    ///< N/mm of the shaft from the hand to the balloon
+  double wireFriction = 0.0;     ///< N on the wire, folded
+  double inflatedFriction = 0.0; ///< N on the wire at rated pressure, more than folded
+  double friction = 0.0;         ///< coefficient on wall and guide
+  double inflationResistance = 0.0; ///< atm s/mL of the lumen that fills it
+  double fillFraction = 0.5;        ///< of contrast medium in what fills it
+
+  /// @throws std::invalid_argument naming the balloon and the property
+  void Validate() const;
+
+  /// mm, even part in air; below the first row the folds open.
+  double FreeRadius(double pressure) const;
+  /// What of the balloon's opening there is, 0 to 1. @param behind  mm behind the tip
+  double Shape(double behind) const;
+  /// mm, outside, folded; 0 before the tip.
+  double FoldedRadius(double behind) const;
+  /// EI, N mm^2. @param pressure  atm @param radius  mm of the balloon there
+  double BendingStiffness(double behind, double pressure, double radius) const;
+  double Middle() const { return this->tipLength + 0.5 * this->length; } ///< mm behind the tip
+  double Reach() const
+  {
+    return this->tipLength + this->length + this->shoulder;
+  } ///< mm, of the balloon's end
 };
 }
 

@@ -1,5 +1,6 @@
 #include "Intervention.h"
 
+#include "BalloonOnWire.h"
 #include "CatheterPath.h"
 #include "CosseratRod.h"
 #include "CyclicTime.h"
@@ -29,6 +30,7 @@ constexpr double LossTime = 2e-3; // s
 constexpr double SpinDrag = 1e-6; // N s
 constexpr int MinimumSegments = 4;
 constexpr double CatheterReach = 10.0; // mm into the vessel
+constexpr double BalloonParked = 5.0;  // mm behind the simulated wire's end, at the beginning
 
 void RequireWithin(double value, double low, double high, const char* name)
 {
@@ -50,6 +52,7 @@ enum class Notice : int
   WireAtEnd,
   Reset,
   PutBack,
+  BalloonLimit,
   Count
 };
 
@@ -59,7 +62,8 @@ const char* const NoticeText[] = { "the input is not finite: the instruments are
   "the catheter is at the end of its way", "the wire is drawn back to the end of its way",
   "no more of the wire can be simulated: it is advanced no further",
   "the wire's equations could not be solved: it is set back to where it was last sane",
-  "the wire left the lumen and was put back" };
+  "the wire left the lumen and was put back",
+  "the balloon is at the end of its way: it has to stay on the wire, and in the guide" };
 }
 
 void InterventionSettings::Validate() const
@@ -123,6 +127,14 @@ struct Intervention::Internals : ContactSurface
   double LastCatheterTip = 0.0;
   double LastCatheterAngle = 0.0;
   WireInGuide Behind; // the wire between the rod and the hand
+
+  // Null without a balloon; then nothing of these is used.
+  std::unique_ptr<BalloonOnWire> Sleeve;
+  std::unique_ptr<DilatableWall> Opening;
+  VesselWay SleeveWay;
+  int SleeveWayBranch = -1;
+  double SleeveHand = 0.0; // as accepted
+  double Inflator = 0.0;   // atm
 
   struct Sane
   {
@@ -190,6 +202,10 @@ struct Intervention::Internals : ContactSurface
           // Its tip is soft: the wire's load goes over from place to place as they leave it.
           plane.stiffness =
             this->Settings.wallStiffness * std::clamp((this->CatheterTip - u) / SoftTip, 0.01, 1.0);
+          if (this->InSleeve(segment))
+          {
+            this->NoFriction(contacts);
+          }
         }
         return;
       }
@@ -205,6 +221,24 @@ struct Intervention::Internals : ContactSurface
       }
     }
     this->Wall->Find(sample, reach, contacts);
+    if (this->InSleeve(segment))
+    {
+      this->NoFriction(contacts);
+    }
+  }
+
+  bool InSleeve(std::int64_t segment) const
+  {
+    return this->Sleeve &&
+      this->Sleeve->Covers(this->Places[segment] - this->Fed + this->Sleeve->Tip());
+  }
+  /// What touches is the sleeve; its friction is the sleeve's.
+  static void NoFriction(SampleContacts& contacts)
+  {
+    for (int n = 0; n < contacts.count; ++n)
+    {
+      contacts.plane[n].friction = 0.0;
+    }
   }
 
   void MakeSegments();
@@ -217,6 +251,11 @@ struct Intervention::Internals : ContactSurface
   void BeginFrame();
   void Drive(const DriveInput& input);
   void Feed();
+  void DriveSleeve(const DriveInput& input);
+  void OpenWall();
+  double SleevePlace() const;
+  BalloonOnWire::Rail Rail() const;
+  void TakeBalloon(const BalloonCatheter& balloon);
   void DriveBehind();
   void PutBack();
   void Reset();
@@ -471,6 +510,12 @@ void Intervention::Internals::BeginFrame()
   const double next = this->Phase + this->FrameSeconds * this->Settings.heartRate / 60.0;
   this->LastPoints.swap(this->NextPoints);
   this->Motion->Positions(next, this->NextPoints);
+  if (this->Sleeve)
+  {
+    this->OpenWall();
+    this->Motion->AxisPositions(next, this->Axis);
+    this->Opening->Deform(this->Axis, this->NextPoints);
+  }
   for (std::size_t i = 0; i < this->TreePoints.size(); ++i)
   {
     this->NextTreePoints[i] = this->NextPoints[this->TreePoints[i]];
@@ -482,6 +527,99 @@ void Intervention::Internals::BeginFrame()
   this->Path->SetAngle(this->CatheterAngle);
   this->Path->BeginFrame(this->RootAxis, this->FrameSeconds);
   this->TickInFrame = 0;
+}
+
+BalloonOnWire::Rail Intervention::Internals::Rail() const
+{
+  return { this->Fed, this->CatheterTip, &this->Places, &this->Segments, &this->Joints };
+}
+
+/// mm from the ostium of the balloon's middle, along its way.
+double Intervention::Internals::SleevePlace() const
+{
+  const double middle = this->Sleeve->Tip() - this->Sleeve->Device().Middle();
+  if (middle <= this->CatheterTip)
+  {
+    return middle;
+  }
+  const double behind = this->Fed - middle; // mm of the wire
+  std::int64_t i = 0;
+  while (i + 1 < this->Rod->Size() && this->Places[i + 1] < behind)
+  {
+    ++i;
+  }
+  const Vector3 point = this->Rod->Position(i) + (behind - this->Places[i]) * this->Rod->Axis(i);
+  double nearest = std::numeric_limits<double>::infinity();
+  double place = 0.0;
+  for (std::size_t n = 1; n < this->SleeveWay.points.size(); ++n)
+  {
+    const SegmentPlace candidate = NearestOnSegment(
+      point, this->Axis[this->SleeveWay.points[n - 1]], this->Axis[this->SleeveWay.points[n]]);
+    if (candidate.squaredDistance < nearest)
+    {
+      nearest = candidate.squaredDistance;
+      place = this->SleeveWay.place[n - 1] +
+        candidate.fraction * (this->SleeveWay.place[n] - this->SleeveWay.place[n - 1]);
+    }
+  }
+  return place;
+}
+
+void Intervention::Internals::OpenWall()
+{
+  if (this->Report.branch >= 0 && this->Report.branch != this->SleeveWayBranch)
+  {
+    this->SleeveWayBranch = this->Report.branch;
+    this->SleeveWay = WayThrough(this->Motion->Topology(), this->SleeveWayBranch);
+  }
+  this->Sleeve->Inflate(this->FrameSeconds, this->Inflator, this->SleevePlace(), this->CatheterTip,
+    this->SleeveWay, *this->Opening);
+}
+
+void Intervention::Internals::DriveSleeve(const DriveInput& input)
+{
+  const double most = this->Settings.maximumSpeed * this->Step;
+  double way = 0.0;
+  if (std::isfinite(input.balloonPosition) && std::isfinite(input.inflation))
+  {
+    way = std::clamp(input.balloonPosition - this->SleeveHand, -most, most);
+    this->SleeveHand += way;
+    this->Inflator = std::clamp(input.inflation, -1.0, 40.0);
+  }
+  const double share =
+    static_cast<double>(this->TickInFrame) / static_cast<double>(this->Settings.ticksPerFrame);
+  if (!this->Sleeve->Drive(way, most, this->Rail(), share, *this->Rod))
+  {
+    this->Say(Notice::BalloonLimit);
+  }
+}
+
+/// @throws std::invalid_argument  it does not fit
+void Intervention::Internals::TakeBalloon(const BalloonCatheter& balloon)
+{
+  balloon.Validate();
+  if (balloon.crossingRadius >= this->Catheter.innerRadius ||
+    balloon.shaftRadius >= this->Catheter.innerRadius)
+  {
+    char text[256];
+    std::snprintf(text, sizeof(text),
+      "the balloon '%s' is thicker (radius %.3f mm) than the inside of the catheter '%s' (radius "
+      "%.3f mm)",
+      balloon.name.c_str(), std::max(balloon.crossingRadius, balloon.shaftRadius),
+      this->Catheter.name.c_str(), this->Catheter.innerRadius);
+    throw std::invalid_argument(text);
+  }
+  const WallTopology& topology = this->Motion->Topology();
+  this->Sleeve = std::make_unique<BalloonOnWire>(
+    balloon, this->Catheter, this->CatheterTip - this->Settings.insideCatheter - BalloonParked);
+  this->Opening = std::make_unique<DilatableWall>(topology, this->NextPoints, this->Axis);
+  int root = 0;
+  while (FirstAxisPoint(topology, root) < static_cast<std::int64_t>(this->RootFirst))
+  {
+    ++root;
+  }
+  this->SleeveWay = WayThrough(topology, root);
+  this->SleeveWayBranch = root;
 }
 
 void Intervention::Internals::Drive(const DriveInput& input)
@@ -655,7 +793,10 @@ void Intervention::Internals::Measure()
   for (const RodContact& contact : this->Rod->Contacts())
   {
     const std::int64_t index = contact.segment * this->Rod->SamplesPerSegment() + contact.sample;
-    if (!this->InVessel[index])
+    // An open balloon's force on the wall is that of its balance.
+    if (!this->InVessel[index] ||
+      (this->Sleeve &&
+        this->Sleeve->Opened(this->Places[contact.segment] - this->Fed + this->Sleeve->Tip())))
     {
       continue;
     }
@@ -681,6 +822,11 @@ void Intervention::Internals::Measure()
   this->Rod->Reaction(last, force, torque);
   const Vector3 forward = -this->Rod->Axis(last);
   this->Behind.Settle(force.dot(forward), this->EndAngle());
+  if (this->Sleeve)
+  {
+    this->Sleeve->Feel(*this->Rod, this->Rail());
+    report.balloon = this->Sleeve->Report();
+  }
   const HandLoad& felt = this->Behind.AtHand();
   report.proximalForce = felt.force;
   report.proximalTorque = felt.torque;
@@ -699,7 +845,8 @@ void Intervention::Internals::Measure()
 }
 
 Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wire,
-  const GuideCatheter& catheter, const InterventionSettings& settings)
+  const GuideCatheter& catheter, const InterventionSettings& settings,
+  const std::optional<BalloonCatheter>& balloon)
   : Data(std::make_unique<Internals>())
 {
   settings.Validate();
@@ -737,6 +884,10 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   data.DriveBehind();
   data.PlaceOnPath();
   data.KeepSane();
+  if (balloon)
+  {
+    data.TakeBalloon(*balloon);
+  }
 }
 
 Intervention::~Intervention() = default;
@@ -760,6 +911,10 @@ const TickReport& Intervention::Step(const DriveInput& input)
   data.Phase = Modulo(data.Phase);
   data.Drive(input);
   data.Feed();
+  if (data.Sleeve)
+  {
+    data.DriveSleeve(input);
+  }
   const RodStep& step = data.Rod->Step(data.Step, &data);
   if (!step.finite || step.maximumGap > 5.0)
   {
@@ -816,6 +971,30 @@ const std::vector<Vector3>& Intervention::CatheterLine() const
   return data.CatheterPoints;
 }
 
+void Intervention::BalloonLine(std::vector<Vector3>& line, std::vector<double>& radii) const
+{
+  const Internals& data = *this->Data;
+  line.clear();
+  radii.clear();
+  if (!data.Sleeve)
+  {
+    return;
+  }
+  const double tip = data.Fed - data.Sleeve->Tip(); // mm of the wire before it
+  double along = 0.0;
+  double wanted = tip;
+  for (std::int64_t i = 0; i < data.Rod->Size(); ++i)
+  {
+    const double length = data.Segments[i].length;
+    for (; wanted <= along + length; wanted += BalloonOnWire::Spacing)
+    {
+      line.push_back(data.Rod->Position(i) + (wanted - along - 0.5 * length) * data.Rod->Axis(i));
+      radii.push_back(data.Sleeve->RadiusAt(wanted - tip));
+    }
+    along += length;
+  }
+}
+
 const std::vector<Vector3>& Intervention::WallPoints() const
 {
   Internals& data = *this->Data;
@@ -852,7 +1031,18 @@ std::uint64_t Intervention::StateHash() const
   {
     hash = Fnv1a(&value, sizeof(value), hash);
   }
-  return data.Behind.Hash(hash);
+  hash = data.Behind.Hash(hash);
+  return data.Sleeve ? data.Opening->Hash(data.Sleeve->Hash(hash)) : hash;
+}
+
+const BalloonOnWire* Intervention::Balloon() const
+{
+  return this->Data->Sleeve.get();
+}
+
+const DilatableWall* Intervention::Dilated() const
+{
+  return this->Data->Opening.get();
 }
 
 std::vector<std::string> Intervention::TakeMessages()

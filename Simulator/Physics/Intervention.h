@@ -5,12 +5,14 @@
 #ifndef DynamicCoronary_Intervention_h
 #define DynamicCoronary_Intervention_h
 
+#include "BalloonOnWire.h"
 #include "DriveInput.h"
 #include "Geometry.h"
 #include "Instrument.h"
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -58,6 +60,7 @@ struct TickReport
   double jointGap = 0.0;           ///< mm, greatest
   int outside = 0; ///< samples whose centre was outside of the lumen and was put back
   int branch = -1; ///< group of the wall next to the wire's tip; -1 in the catheter
+  BalloonReport balloon;
 };
 
 /**
@@ -70,7 +73,8 @@ public:
   /// @throws std::invalid_argument naming what is wrong: instruments, settings, an instrument that does not fit
   /// into the vessel or the other one
   Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wire,
-    const GuideCatheter& catheter, const InterventionSettings& settings = {});
+    const GuideCatheter& catheter, const InterventionSettings& settings = {},
+    const std::optional<BalloonCatheter>& balloon = {});
   ~Intervention();
   Intervention(Intervention&&) noexcept;
   Intervention& operator=(Intervention&&) noexcept;
@@ -87,13 +91,20 @@ public:
   const std::vector<Vector3>& Centerline() const;
   /// The catheter from its tip back, mm.
   const std::vector<Vector3>& CatheterLine() const;
+  /// The balloon catheter from its tip to where the simulated wire ends, and its radii; empty without, or in the guide.
+  void BalloonLine(std::vector<Vector3>& line, std::vector<double>& radii) const;
   /// The wall now, mm.
   const std::vector<Vector3>& WallPoints() const;
   /// Some of its points now. @param which  numbers of points, in range
   void SomeWallPoints(
     const std::vector<std::int64_t>& which, std::vector<Vector3>& positions) const;
 
-  /// FNV-1a over the bits of the wire's, the hands' and the heart's state. What the wall keeps to be faster, and the
+  /// Null: there is no balloon in this session.
+  const BalloonOnWire* Balloon() const;
+  /// What the balloon opens; null without.
+  const DilatableWall* Dilated() const;
+
+  /// FNV-1a over the bits of the wire's, the balloon's, the hands' and the heart's state. What the wall keeps to be faster, and the
   /// forces in the joints, follow from these and the ticks before.
   std::uint64_t StateHash() const;
 

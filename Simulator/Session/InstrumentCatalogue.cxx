@@ -101,6 +101,34 @@ WireSection SectionOf(JsonFields& fields)
   return section;
 }
 
+/// A number of a balloon in its file: diameters there are radii here.
+struct BalloonNumber
+{
+  const char* name;
+  double BalloonCatheter::*value;
+  double scale;
+};
+constexpr BalloonNumber BalloonNumbers[] = { { "length_mm", &BalloonCatheter::length, 1.0 },
+  { "tip_mm", &BalloonCatheter::tipLength, 1.0 },
+  { "shoulder_mm", &BalloonCatheter::shoulder, 1.0 },
+  { "tip_diameter_mm", &BalloonCatheter::tipRadius, 0.5 },
+  { "crossing_profile_mm", &BalloonCatheter::crossingRadius, 0.5 },
+  { "shaft_diameter_mm", &BalloonCatheter::shaftRadius, 0.5 },
+  { "monorail_mm", &BalloonCatheter::monorail, 1.0 },
+  { "marker_mm", &BalloonCatheter::markerLength, 1.0 },
+  { "nominal_pressure_atm", &BalloonCatheter::nominalPressure, 1.0 },
+  { "rated_pressure_atm", &BalloonCatheter::ratedPressure, 1.0 },
+  { "tip_bending_stiffness_N_mm2", &BalloonCatheter::tipStiffness, 1.0 },
+  { "folded_bending_stiffness_N_mm2", &BalloonCatheter::balloonStiffness, 1.0 },
+  { "shaft_bending_stiffness_N_mm2", &BalloonCatheter::shaftStiffness, 1.0 },
+  { "film_stiffness_N_per_mm", &BalloonCatheter::filmStiffness, 1.0 },
+  { "push_stiffness_N_per_mm", &BalloonCatheter::pushStiffness, 1.0 },
+  { "friction_on_wire_N", &BalloonCatheter::wireFriction, 1.0 },
+  { "inflated_friction_on_wire_N", &BalloonCatheter::inflatedFriction, 1.0 },
+  { "friction", &BalloonCatheter::friction, 1.0 },
+  { "inflation_resistance_atm_s_per_mL", &BalloonCatheter::inflationResistance, 1.0 },
+  { "contrast_fraction", &BalloonCatheter::fillFraction, 1.0 } };
+
 template <typename Instrument>
 void Check(const Instrument& instrument, const std::string& where)
 {
@@ -204,6 +232,52 @@ CatalogueCatheter CatheterFromJson(const Json& object, const std::string& where)
   return result;
 }
 
+CatalogueBalloon BalloonFromJson(const Json& object, const std::string& where)
+{
+  CatalogueBalloon result;
+  BalloonCatheter& balloon = result.balloon;
+  const std::string name =
+    object.is_object() && object.contains("name") && object["name"].is_string()
+    ? " '" + object["name"].get<std::string>() + "'"
+    : "";
+  JsonFields fields(object, where + ": balloon" + name);
+  balloon.name = fields.Text("name");
+  balloon.source = fields.Text("source", "");
+  result.description = fields.Text("description", "");
+  for (const BalloonNumber& number : BalloonNumbers)
+  {
+    balloon.*number.value = number.scale * fields.Number(number.name, 0.0, Any);
+  }
+  for (const Json& entry : fields.List("compliance"))
+  {
+    JsonFields row(
+      entry, fields.Where() + ", row " + std::to_string(balloon.compliance.size() + 1));
+    balloon.compliance.push_back(
+      { row.Number("pressure_atm", 0.0, Any), row.Number("diameter_mm", 0.0, Any) });
+    row.Done();
+  }
+  result.sources = SourcesOf(fields);
+  fields.Done();
+  Check(balloon, where);
+  return result;
+}
+
+Json BalloonToJson(const BalloonCatheter& balloon)
+{
+  Json json = { { "name", balloon.name }, { "source", balloon.source } };
+  for (const BalloonNumber& number : BalloonNumbers)
+  {
+    json[number.name] = balloon.*number.value / number.scale;
+  }
+  json["compliance"] = Json::array();
+  for (const ComplianceRow& row : balloon.compliance)
+  {
+    json["compliance"].push_back(
+      { { "pressure_atm", row.pressure }, { "diameter_mm", row.diameter } });
+  }
+  return json;
+}
+
 Json WireToJson(const Guidewire& wire)
 {
   Json sections = Json::array();
@@ -246,6 +320,12 @@ const CatalogueCatheter& InstrumentCatalogue::Catheter(const std::string& name) 
     [](const CatalogueCatheter& one) { return one.catheter.name; });
 }
 
+const CatalogueBalloon& InstrumentCatalogue::Balloon(const std::string& name) const
+{
+  return Named(this->balloons, name, "balloon", this->origin,
+    [](const CatalogueBalloon& one) { return one.balloon.name; });
+}
+
 InstrumentCatalogue CatalogueFromText(const std::string& text, const std::string& origin)
 {
   const Json json = ParseBoundedJson(text, origin);
@@ -272,6 +352,12 @@ InstrumentCatalogue CatalogueFromText(const std::string& text, const std::string
   {
     catalogue.catheters.push_back(CatheterFromJson(entry, origin));
     isNew(catalogue.catheters.back().catheter.name);
+  }
+  const Json none = Json::array();
+  for (const Json& entry : fields.Has("balloons") ? fields.List("balloons") : none)
+  {
+    catalogue.balloons.push_back(BalloonFromJson(entry, origin));
+    isNew(catalogue.balloons.back().balloon.name);
   }
   fields.Done();
   return catalogue;

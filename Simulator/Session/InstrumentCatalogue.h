@@ -1,6 +1,6 @@
 /**
  * @file InstrumentCatalogue.h
- * @brief Guidewires and guide catheters by name, read from JSON. docs/simulator-files.md has the format.
+ * @brief Guidewires, guide catheters and balloons by name, read from JSON. docs/simulator-files.md has the format.
  */
 #ifndef DynamicCoronary_InstrumentCatalogue_h
 #define DynamicCoronary_InstrumentCatalogue_h
@@ -43,16 +43,25 @@ struct CatalogueCatheter
   ValueSources sources;
 };
 
+struct CatalogueBalloon
+{
+  BalloonCatheter balloon;
+  std::string description;
+  ValueSources sources;
+};
+
 struct InstrumentCatalogue
 {
   std::string origin; ///< for messages: the file's name in quotes
   std::vector<CatalogueWire> wires;
   std::vector<CatalogueCatheter> catheters;
+  std::vector<CatalogueBalloon> balloons;
 
   ///@{
   /// @throws std::invalid_argument naming the catalogue, the name and the names that there are
   const CatalogueWire& Wire(const std::string& name) const;
   const CatalogueCatheter& Catheter(const std::string& name) const;
+  const CatalogueBalloon& Balloon(const std::string& name) const;
   ///@}
 };
 

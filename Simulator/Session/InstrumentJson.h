@@ -20,12 +20,14 @@ namespace coronary
  */
 CatalogueWire WireFromJson(const nlohmann::json& object, const std::string& where);
 CatalogueCatheter CatheterFromJson(const nlohmann::json& object, const std::string& where);
+CatalogueBalloon BalloonFromJson(const nlohmann::json& object, const std::string& where);
 ///@}
 
 ///@{
 /// Values only; reading it gives the same bits.
 nlohmann::json WireToJson(const Guidewire& wire);
 nlohmann::json CatheterToJson(const GuideCatheter& catheter);
+nlohmann::json BalloonToJson(const BalloonCatheter& balloon);
 ///@}
 }
 

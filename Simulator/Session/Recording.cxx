@@ -34,8 +34,11 @@ constexpr std::size_t BlockHead = 4 + 4;
 constexpr std::size_t ItemHead = 1 + 4 + 8;
 constexpr int Compression = 1; // fast: it happens between two ticks
 
-/// Bits of the numbers of an input, in the order of the header's axes; the pedals come last.
+/// Bits of the numbers of an input, in the order of the header's axes. The pedals come where they were before there was a
+/// balloon; recordings of that time end with them.
 constexpr std::size_t Axes = HandAxes + 1;
+constexpr std::size_t Pedals = 11;
+constexpr std::size_t AxesWithoutBalloon = Pedals + 1;
 using InputBits = std::array<std::uint64_t, Axes>;
 
 InputBits BitsOf(const SessionInput& input)
@@ -43,17 +46,19 @@ InputBits BitsOf(const SessionInput& input)
   const AxisPlaces places = PlacesOf(input);
   InputBits bits{};
   std::memcpy(bits.data(), places.data(), sizeof(places));
-  bits[HandAxes] = input.pedals;
+  std::copy_backward(bits.begin() + Pedals, bits.begin() + HandAxes, bits.end());
+  bits[Pedals] = input.pedals;
   return bits;
 }
 
-SessionInput InputOf(const InputBits& bits)
+SessionInput InputOf(InputBits bits)
 {
+  SessionInput input;
+  input.pedals = static_cast<std::uint32_t>(bits[Pedals]);
+  std::copy(bits.begin() + AxesWithoutBalloon, bits.end(), bits.begin() + Pedals);
   AxisPlaces places{};
   std::memcpy(places.data(), bits.data(), sizeof(places));
-  SessionInput input;
   SetPlaces(input, places);
-  input.pedals = static_cast<std::uint32_t>(bits[HandAxes]);
   return input;
 }
 
@@ -64,7 +69,7 @@ Json AxesJson()
   {
     axes.push_back({ { "name", axis.recorded }, { "unit", UnitName(axis.unit) } });
   }
-  axes.push_back({ { "name", "pedals" }, { "unit", "bits" } });
+  axes.insert(axes.begin() + Pedals, Json{ { "name", "pedals" }, { "unit", "bits" } });
   return axes;
 }
 
@@ -151,9 +156,12 @@ RecordingHeader HeaderOf(const std::string& text, const std::string& origin)
   header.seed = HexadecimalOf(fields, "seed");
   header.tickRate = fields.Number("tick_hz", 1.0, 1e6);
   header.started = fields.Text("start_utc");
-  if (fields.List("axes") != AxesJson())
+  const Json axes = AxesJson();
+  const Json old(axes.begin(), axes.begin() + AxesWithoutBalloon);
+  if (fields.List("axes") != axes && fields.List("axes") != old)
   {
-    fields.Refuse("has other axes than those of wire, catheter, syringe, pedals and C-arm");
+    fields.Refuse(
+      "has other axes than those of wire, catheter, syringe, pedals, C-arm and balloon");
   }
   return header;
 }

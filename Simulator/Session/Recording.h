@@ -26,7 +26,8 @@
  * - 1 input: mask of the numbers that changed (2 bytes), then for each of them, in the order of
  *   the header's `axes`, 8 bytes: wire position and angle, catheter position and angle, syringe
  *   (mL), C-arm primary and secondary angle (rad), source to detector (mm), table x, y, z (mm),
- *   all doubles; pedals (bits: 1 fluoroscopy, 2 cine, 4 mask), a whole number. Written are the
+ *   all doubles; pedals (bits: 1 fluoroscopy, 2 cine, 4 mask), a whole number; inflation (atm) and
+ *   balloon position (mm), doubles, which older recordings do not have. Written are the
  *   number's 64 bits less those before, modulo 2^64. A tick without change has none; before the
  *   first all are 0, source to detector 1100
  * - 2 force: four single-precision numbers: proximal force (N), proximal torque (N mm), tip force

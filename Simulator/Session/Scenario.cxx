@@ -398,6 +398,19 @@ Json ContrastToJson(const ContrastSettings& given)
   return json;
 }
 
+VesselLesion LesionOf(const Json& object, const std::string& where)
+{
+  VesselLesion lesion;
+  JsonFields fields(object, where);
+  lesion.vessel = fields.Text("vessel");
+  lesion.place = fields.Number("at_mm", 0.0, 500.0);
+  lesion.length = fields.Number("length_mm", 2.0, 60.0, lesion.length);
+  lesion.degree = fields.Number("degree", 0.0, 0.95);
+  lesion.calciumArc = fields.Number("calcium_arc_deg", 0.0, 360.0, 0.0);
+  fields.Done();
+  return lesion;
+}
+
 bool StartsWith(const std::string& text, const char* start)
 {
   return text.rfind(start, 0) == 0;
@@ -452,6 +465,18 @@ Scenario ScenarioFromText(
     ? byName(
         "catheter", [&](const std::string& name) { return catalogue->Catheter(name).catheter; })
     : CatheterFromJson(fields.Object("catheter"), origin).catheter;
+  if (fields.Has("balloon"))
+  {
+    scenario.balloon = fields.Any("balloon").is_string()
+      ? byName("balloon", [&](const std::string& name) { return catalogue->Balloon(name).balloon; })
+      : BalloonFromJson(fields.Object("balloon"), origin).balloon;
+  }
+  const Json none = Json::array();
+  for (const Json& entry : fields.Has("lesions") ? fields.List("lesions") : none)
+  {
+    scenario.lesions.push_back(
+      LesionOf(entry, origin + ", lesion " + std::to_string(scenario.lesions.size() + 1)));
+  }
   const auto part = [&](const char* name)
   { return fields.Has(name) ? fields.Object(name) : Json::object(); };
   scenario.settings = SettingsOf(part("settings"), origin + ", settings");
@@ -465,13 +490,23 @@ Scenario ScenarioFromText(
 
 std::string ScenarioText(const Scenario& scenario)
 {
-  const Json json = { { "format", "dynamiccoronary scenario" }, { "version", 1 },
+  Json json = { { "format", "dynamiccoronary scenario" }, { "version", 1 },
     { "name", scenario.name }, { "description", scenario.description },
     { "vessels", VesselsToJson(scenario.vessels) }, { "artery", scenario.artery },
     { "wire", WireToJson(scenario.wire) }, { "catheter", CatheterToJson(scenario.catheter) },
     { "settings", SettingsToJson(scenario.settings) },
     { "imaging", ImagingToJson(scenario.imaging) },
     { "contrast", ContrastToJson(scenario.contrast) }, { "seed", scenario.seed } };
+  if (scenario.balloon)
+  {
+    json["balloon"] = BalloonToJson(*scenario.balloon);
+  }
+  for (const VesselLesion& lesion : scenario.lesions)
+  {
+    json["lesions"].push_back(
+      { { "vessel", lesion.vessel }, { "at_mm", lesion.place }, { "length_mm", lesion.length },
+        { "degree", lesion.degree }, { "calcium_arc_deg", lesion.calciumArc } });
+  }
   return json.dump(2) + "\n";
 }
 

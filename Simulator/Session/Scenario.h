@@ -10,11 +10,13 @@
 #include "ContrastModel.h"
 #include "Instrument.h"
 #include "Intervention.h"
+#include "VesselLesions.h"
 #include "VesselSource.h"
 #include "WallMotion.h"
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -44,6 +46,8 @@ struct Scenario
   std::string artery = "LCA"; ///< LCA, RCA, or "any": the first root
   Guidewire wire;
   GuideCatheter catheter;
+  std::optional<BalloonCatheter> balloon; ///< none: the session has none
+  std::vector<VesselLesion> lesions;      ///< set into the vessels
   InterventionSettings settings;
   ImagingSettings imaging;
   ContrastSettings contrast;

@@ -15,8 +15,11 @@ namespace
 constexpr double CoilLength = 30.0; // mm from the tip: a coil of platinum, which shows best
 constexpr double BraidShare =
   0.12; // of a guide catheter's wall that is steel: 16 flat wires of 25 x 75 um or so
-constexpr double BlushSigma = 7.0;     // mm of the myocardium behind an outlet
-constexpr double FaintestBlush = 1e-5; // mL
+constexpr double InnerTube =
+  0.28; // mm: outer radius of the wire's lumen in a balloon, that its markers are on
+constexpr double MarkerThickness = 0.04; // mm of platinum
+constexpr double BlushSigma = 7.0;       // mm of the myocardium behind an outlet
+constexpr double FaintestBlush = 1e-5;   // mL
 
 /// Where a branch leaves its parent: number of the nearest point of the parent's axis.
 std::size_t Attachment(const WallTopology& topology, std::size_t branch)
@@ -187,6 +190,41 @@ void SessionImager::ProjectInstruments(
     // Nobody flushes it: what was injected last stays in it.
     addCatheter({ guide.innerRadius, 0.0, this->NeatContrast });
   }
+  if (this->Scenario_.balloon && snapshot.balloon.size() > 1)
+  {
+    this->ProjectBalloon(snapshot, geometry);
+  }
+}
+
+/// Shaft, markers, and what the balloon is filled with.
+void SessionImager::ProjectBalloon(const SessionSnapshot& snapshot, const CArmGeometry& geometry)
+{
+  const BalloonCatheter& balloon = *this->Scenario_.balloon;
+  const double polymer = this->Materials.Of(XRayMaterial::Nylon);
+  const double platinum = this->Materials.Of(XRayMaterial::Platinum);
+  InstrumentChain shaft{ snapshot.balloon, {} };
+  InstrumentChain markers = shaft;
+  ContrastBranch fill{ snapshot.balloon, snapshot.balloonRadii, {} };
+  double behind = 0.0;
+  for (std::size_t n = 0; n + 1 < snapshot.balloon.size(); ++n)
+  {
+    const double length = (snapshot.balloon[n + 1] - snapshot.balloon[n]).norm();
+    const double middle = behind + 0.5 * length;
+    const double folded = balloon.FoldedRadius(middle);
+    const double inner = std::min(0.8 * folded, InnerTube);
+    shaft.segments.push_back({ folded, inner, polymer });
+    const double toMarker = std::min(
+      std::abs(middle - balloon.tipLength), std::abs(middle - balloon.tipLength - balloon.length));
+    const bool marked = toMarker <= 0.5 * balloon.markerLength;
+    markers.segments.push_back({ InnerTube + MarkerThickness, InnerTube, marked ? platinum : 0.0 });
+    const double radius = 0.5 * (snapshot.balloonRadii[n] + snapshot.balloonRadii[n + 1]);
+    const double open = std::max(0.0, 1.0 - folded * folded / (radius * radius));
+    fill.concentrations.push_back(balloon.fillFraction * open);
+    behind += length;
+  }
+  AddInstrument(shaft, geometry, this->InstrumentLayer);
+  AddInstrument(markers, geometry, this->InstrumentLayer);
+  AddContrast({ fill }, this->NeatContrast, geometry, this->InstrumentLayer);
 }
 
 InstrumentChain SessionImager::WireOf(const SessionSnapshot& snapshot) const
@@ -246,9 +284,20 @@ void SessionImager::ProjectContrast(const SessionSnapshot& snapshot, const CArmG
     ContrastBranch& branch = this->Branches[b];
     branch.points.assign(first + static_cast<std::ptrdiff_t>(skip), last);
     branch.radii.assign(radii.begin() + static_cast<std::ptrdiff_t>(skip), radii.end());
+    for (std::size_t k = skip; k < count && !snapshot.lumen.empty(); ++k)
+    {
+      branch.radii[k - skip] = snapshot.lumen[point + k];
+    }
     const auto slabs = snapshot.concentration.begin() + static_cast<std::ptrdiff_t>(slab);
     branch.concentrations.assign(
       slabs + static_cast<std::ptrdiff_t>(skip), slabs + static_cast<std::ptrdiff_t>(count) - 1);
+    for (std::size_t k = skip; k + 1 < count && !snapshot.lumen.empty(); ++k)
+    {
+      // What the balloon catheter takes of the lumen holds none.
+      const double taken = 0.5 * (snapshot.filled[point + k] + snapshot.filled[point + k + 1]);
+      const double lumen = 0.5 * (snapshot.lumen[point + k] + snapshot.lumen[point + k + 1]);
+      branch.concentrations[k - skip] *= std::max(0.0, 1.0 - taken * taken / (lumen * lumen));
+    }
     any = any ||
       std::any_of(branch.concentrations.begin(), branch.concentrations.end(),
         [](double value) { return value > 0.0; });

@@ -81,6 +81,7 @@ private:
   CArmGeometry GeometryOf(const CArmPose& pose, double fieldOfView) const;
   void ProjectInstruments(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   InstrumentChain WireOf(const SessionSnapshot& snapshot) const;
+  void ProjectBalloon(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   void ProjectContrast(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
 
   Scenario Scenario_;

@@ -3,6 +3,7 @@
 #include "ParallelFor.h"
 #include "Recording.h"
 #include "SessionImager.h"
+#include "VesselLesions.h"
 #include "VesselModel.h"
 
 namespace coronary
@@ -33,7 +34,9 @@ SessionWorld LoadWorld(const Scenario& scenario, bool background, const WorldPro
     loadPatient({});
   }
   VesselModel model = LoadVessels(scenario.vessels, step("vessels"));
-  world.wall = model.wall;
+  world.wall = scenario.lesions.empty()
+    ? model.wall
+    : std::make_shared<NarrowedWallMotion>(model.wall, scenario.lesions);
   world.motion = model.motion;
   world.notes = model.notes;
   world.heart = model.heart;

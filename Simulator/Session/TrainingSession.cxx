@@ -50,8 +50,10 @@ struct TrainingSession::Internals
     : Wall(std::move(motion))
     , Settings(WithRoot(*this->Wall, scenario))
     , Imaging(scenario.imaging)
-    , Physics(this->Wall, scenario.wire, scenario.catheter, this->Settings)
+    , Physics(this->Wall, scenario.wire, scenario.catheter, this->Settings, scenario.balloon)
     , Medium(this->Wall->Topology(), scenario.contrast, scenario.seed)
+    , Watch(this->Wall->Topology(), this->Medium)
+    , Balloon(scenario.balloon)
     , Clock(AcquisitionOf(scenario))
     , HeartRate(this->Settings.heartRate)
     , TicksOfContrast(std::max<std::uint64_t>(
@@ -72,6 +74,8 @@ struct TrainingSession::Internals
   ImagingSettings Imaging;
   Intervention Physics;
   ContrastModel Medium;
+  LesionWatch Watch;
+  std::optional<BalloonCatheter> Balloon;
   ExposureClock Clock;
   double HeartRate;
   std::uint64_t TicksOfContrast;
@@ -135,6 +139,7 @@ void TrainingSession::Internals::StepContrast(const SessionInput& input)
   this->FarTooFast = wanted > 2.0;
   this->Report.injection = pushed / seconds;
   const double place = this->Report.tick.catheterTip;
+  this->Watch.StepFlow(seconds, this->Physics, this->Medium);
   this->Medium.Step(seconds, this->Report.tick.phase, this->HeartRate, this->Report.injection,
     { place >= 0.0 ? this->Settings.rootBranch : -1, std::max(0.0, place) });
 }
@@ -165,6 +170,11 @@ void TrainingSession::Internals::Measure(const SessionInput& input)
       metrics.branches.end())
   {
     metrics.branches.push_back(tick.branch);
+  }
+  this->Watch.StepTick(metrics.procedureSeconds, this->Physics, this->Balloon, this->Messages);
+  if (metrics.events.size() < this->Watch.Events().size())
+  {
+    metrics.events = this->Watch.Events();
   }
 }
 
@@ -276,6 +286,11 @@ const ContrastModel& TrainingSession::Contrast() const
   return this->Data->Medium;
 }
 
+std::vector<LesionResult> TrainingSession::Lesions() const
+{
+  return this->Data->Watch.Results(this->Data->Physics, this->Data->Medium);
+}
+
 const WallTopology& TrainingSession::Topology() const
 {
   return this->Data->Wall->Topology();
@@ -350,12 +365,16 @@ void TrainingSession::SnapshotOfImage(SessionSnapshot& snapshot) const
   data.Wall->AxisPositions(data.Report.tick.phase, snapshot.axis);
   snapshot.concentration = data.Medium.Concentration();
   snapshot.blush = data.Medium.BlushVolume();
+  snapshot.lumen = data.Watch.Lumen();
+  snapshot.filled = data.Watch.Filled();
+  data.Physics.BalloonLine(snapshot.balloon, snapshot.balloonRadii);
 }
 
 void TrainingSession::SnapshotOfScene(
   const std::vector<std::int64_t>& wallPoints, SessionSnapshot& snapshot) const
 {
   this->SnapshotOfImage(snapshot);
+  snapshot.lesions = this->Lesions();
   this->Data->Physics.SomeWallPoints(wallPoints, snapshot.wall);
   this->Data->Medium.TracerPositions(snapshot.axis, snapshot.tracers, snapshot.tracerVolumes);
 }

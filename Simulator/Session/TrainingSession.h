@@ -10,6 +10,7 @@
 #include "CArm.h"
 #include "ContrastModel.h"
 #include "Intervention.h"
+#include "LesionWatch.h"
 #include "Recording.h"
 #include "Scenario.h"
 #include "SessionInput.h"
@@ -38,6 +39,7 @@ struct SessionMetrics
   double wireTurning = 0.0;      ///< radians, left and right together
   double deepest = 0.0;          ///< mm of wire beyond the catheter's tip
   std::vector<int> branches; ///< in which the tip has been, in the order in which they were reached
+  std::vector<ProcedureEvent> events;
 };
 
 /// N: what a tip that is pushed against a wall should not do for long. The tips of workhorse wires buckle below it.
@@ -72,6 +74,14 @@ struct SessionSnapshot
   std::vector<Vector3> axis;         ///< as WallMotion::AxisPositions
   std::vector<double> concentration; ///< as ContrastModel::Concentration
   std::vector<double> blush;         ///< per branch, mL
+  ///@{
+  /// With a balloon, else empty.
+  std::vector<double> lumen;        ///< mm, per point of the axis
+  std::vector<double> filled;       ///< mm, likewise: of the balloon catheter in it
+  std::vector<Vector3> balloon;     ///< its line from its tip to where the simulated wire ends, mm
+  std::vector<double> balloonRadii; ///< mm, outside
+  ///@}
+  std::vector<LesionResult> lesions; ///< only of SnapshotOfScene
   std::vector<Vector3> wall;         ///< only of SnapshotOfScene
   std::vector<Vector3> tracers;      ///< only of SnapshotOfScene, mm
   std::vector<float> tracerVolumes;  ///< mL of contrast medium
@@ -112,6 +122,7 @@ public:
   const SessionMetrics& Metrics() const;
   const Intervention& Instruments() const;
   const ContrastModel& Contrast() const;
+  std::vector<LesionResult> Lesions() const;
   const WallTopology& Topology() const;
   const CArmPose& Pose() const;
   double FieldOfView() const; ///< mm of the detector, across

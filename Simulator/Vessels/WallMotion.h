@@ -25,6 +25,10 @@ struct WallTopology
   std::vector<std::vector<Vector3>> axis;
   std::vector<std::vector<double>> axisRadius; ///< mm, as axis
   std::vector<int> parent;                     ///< per branch: the one that it leaves, -1 at a root
+  /// mm, as axis: of the vessel without its lesions; empty: not known.
+  std::vector<std::vector<double>> axisReference;
+  /// Degrees of the section that calcium takes, as axis; empty: none.
+  std::vector<std::vector<double>> axisCalcium;
 };
 
 /// Positions of the wall's points over the cycle. Periodic; any real phase is taken modulo 1.

@@ -6,6 +6,32 @@
 
 namespace coronary
 {
+namespace
+{
+const char* const NoBalloon = "none";
+
+/// The balloon, and the first lesion as it is now.
+QString TextOfBalloon(const SessionSnapshot& moment, bool hasBalloon)
+{
+  const BalloonReport& balloon = moment.report.balloon;
+  QString text;
+  if (hasBalloon)
+  {
+    text += QString("\nBalloon  %1 mm out, %2 atm\n%3 to %4 mm wide, hand %5 N")
+              .arg(Decimal(balloon.tip, 1), Decimal(balloon.pressure, 1), Decimal(balloon.least, 2),
+                Decimal(balloon.greatest, 2), Decimal(balloon.force, 2));
+  }
+  for (const LesionResult& lesion : moment.lesions)
+  {
+    text += QString("\nLesion in %1  %2 % (was %3)\nPd/Pa %4, FFR %5")
+              .arg(QString::fromStdString(lesion.vessel), Decimal(100.0 * lesion.degree, 0),
+                Decimal(100.0 * lesion.degreeBefore, 0), Decimal(lesion.pressureRatio, 2),
+                Decimal(lesion.reserve, 2));
+  }
+  return text;
+}
+}
+
 InstrumentPanel::InstrumentPanel()
   : QGroupBox("Instruments")
 {
@@ -17,7 +43,12 @@ InstrumentPanel::InstrumentPanel()
   {
     this->Catheter->addItem(QString::fromStdString(one.catheter.name));
   }
-  for (QComboBox* box : { this->Wire, this->Catheter })
+  this->Balloon->addItem(NoBalloon);
+  for (const CatalogueBalloon& one : BuiltInCatalogue().balloons)
+  {
+    this->Balloon->addItem(QString::fromStdString(one.balloon.name));
+  }
+  for (QComboBox* box : { this->Wire, this->Catheter, this->Balloon })
   {
     box->setToolTip("Taken at the next new session");
   }
@@ -25,6 +56,7 @@ InstrumentPanel::InstrumentPanel()
   auto* form = new QFormLayout(this);
   form->addRow("Wire", this->Wire);
   form->addRow("Catheter", this->Catheter);
+  form->addRow("Balloon", this->Balloon);
   form->addRow(this->Text);
 }
 
@@ -32,15 +64,19 @@ void InstrumentPanel::ShowScenario(const Scenario& scenario)
 {
   Choose(*this->Wire, QString::fromStdString(scenario.wire.name), {});
   Choose(*this->Catheter, QString::fromStdString(scenario.catheter.name), {});
+  Choose(*this->Balloon,
+    scenario.balloon ? QString::fromStdString(scenario.balloon->name) : QString(NoBalloon), {});
 }
 
-void InstrumentPanel::ShowReport(const TickReport& report, const WallTopology& topology)
+void InstrumentPanel::ShowMoment(const SessionSnapshot& moment, const WallTopology& topology)
 {
+  const TickReport& report = moment.report;
   this->Text->setText(QString("Beyond the catheter  %1 mm, in %2\nCatheter beyond ostium  %3 mm\n"
                               "Hand  %4 N, %5 N mm    Tip  %6 N")
                         .arg(Decimal(report.inserted, 1), BranchName(topology, report.branch),
                           Decimal(report.catheterTip, 1), Decimal(report.proximalForce, 2),
-                          Decimal(report.proximalTorque, 2), Decimal(report.tipForce, 2)));
+                          Decimal(report.proximalTorque, 2), Decimal(report.tipForce, 2)) +
+    TextOfBalloon(moment, moment.lumen.size() > 0));
 }
 
 void InstrumentPanel::Take(Scenario& scenario) const
@@ -54,6 +90,15 @@ void InstrumentPanel::Take(Scenario& scenario) const
   if (catheter != scenario.catheter.name)
   {
     scenario.catheter = BuiltInCatalogue().Catheter(catheter).catheter;
+  }
+  const auto balloon = this->Balloon->currentText().toStdString();
+  if (balloon == NoBalloon)
+  {
+    scenario.balloon.reset();
+  }
+  else if (!scenario.balloon || scenario.balloon->name != balloon)
+  {
+    scenario.balloon = BuiltInCatalogue().Balloon(balloon).balloon;
   }
 }
 }

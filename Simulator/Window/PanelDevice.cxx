@@ -25,7 +25,6 @@ void PanelDevice::Read(std::uint64_t /*tick*/, double secondsPerTick, InputFrame
   this->Place.syringe += this->Injection * secondsPerTick;
   this->Place.pedals = this->Pedals;
   frame.input = this->Place;
-  frame.inflation = 0.0;
   frame.buttons = 0;
   frame.axes = WireAxes | CatheterAxes | SyringeAxis;
   frame.state = DeviceState::Running;

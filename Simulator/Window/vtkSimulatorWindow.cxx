@@ -492,7 +492,7 @@ void SessionWindow::ShowScene()
   ++this->AllDrawn;
   this->Traces->Add(this->Now);
   const WallTopology& topology = this->World.wall->Topology();
-  this->Instruments->ShowReport(this->Now.report, topology);
+  this->Instruments->ShowMoment(this->Now, topology);
   this->Contrast->ShowBalance(this->Now.contrast);
   this->Metrics->ShowMetrics(this->Now.metrics, topology);
   this->View->Follow(this->Now.pose, this->Now.input.table);

@@ -19,7 +19,7 @@ namespace coronary
 /// Where the hands on a device are; by AxisKind, in mm, radians, mL, atm.
 struct HandPlaces
 {
-  std::array<double, static_cast<std::size_t>(AxisKind::Inflation) + 1> places{};
+  std::array<double, static_cast<std::size_t>(LastAxisKind) + 1> places{};
   std::uint16_t pedals = 0;
   std::uint16_t buttons = 0;
 };

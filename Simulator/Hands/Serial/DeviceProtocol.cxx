@@ -217,7 +217,7 @@ void Fields(Payload& payload, CapsMessage& caps)
 {
   payload.Value(caps.index);
   payload.Value(caps.count);
-  payload.Known(caps.kind, AxisKind::Inflation);
+  payload.Known(caps.kind, LastAxisKind);
   payload.Known(caps.unit, AxisUnit::Atmosphere);
   payload.Value(caps.stateRate);
   payload.Skip(2);

@@ -53,6 +53,7 @@
  * - 8 source to detector (mm): away from the source
  * - 9, 10, 11 table (mm): isocentre to the patient's left, back, head
  * - 12 indeflator (atm): pressure
+ * - 13 balloon catheter: advance (mm)
  * - 0 and unknown kinds: present, but moves nothing
  *
  * Only kinds 1 to 4 have motors in this version. Counts are absolute. They may start anywhere and

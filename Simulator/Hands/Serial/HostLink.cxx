@@ -23,21 +23,17 @@ std::size_t KindOf(const CapsMessage& caps)
   return static_cast<std::size_t>(caps.kind);
 }
 
-constexpr double FastestInflation = 200.0; // atm/s
-
 /// Units a second that no hand reaches.
 double FastestOf(AxisKind kind)
 {
   const HandAxis* axis = HandAxisOf(kind);
-  return axis                     ? axis->fastest
-    : kind == AxisKind::Inflation ? FastestInflation
-                                  : std::numeric_limits<double>::infinity();
+  return axis ? axis->fastest : std::numeric_limits<double>::infinity();
 }
 
 AxisUnit UnitOf(AxisKind kind)
 {
   const HandAxis* axis = HandAxisOf(kind);
-  return axis ? axis->unit : kind == AxisKind::Inflation ? AxisUnit::Atmosphere : AxisUnit::None;
+  return axis ? axis->unit : AxisUnit::None;
 }
 
 std::uint32_t GroupOf(AxisKind kind)

@@ -46,7 +46,7 @@ struct PhysicsWord
 /// What the device has to say, as places since the link was made, which do not jump.
 struct LinkSnapshot
 {
-  static constexpr std::size_t Kinds = static_cast<std::size_t>(AxisKind::Inflation) + 1;
+  static constexpr std::size_t Kinds = static_cast<std::size_t>(LastAxisKind) + 1;
 
   std::uint64_t version = 0; ///< goes up with every STATE
   DeviceState state = DeviceState::Connecting;

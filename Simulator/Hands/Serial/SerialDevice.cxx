@@ -89,7 +89,6 @@ void SerialDevice::Read(std::uint64_t /*tick*/, double secondsPerTick, InputFram
   frame = {};
   frame.axes = this->Latest.axes;
   frame.state = this->Silence < LostAfter ? this->Latest.state : DeviceState::Disconnected;
-  frame.inflation = this->Places[static_cast<std::size_t>(AxisKind::Inflation)];
   SessionInput& input = frame.input;
   AxisPlaces places;
   for (std::size_t axis = 0; axis < HandAxes; ++axis)
