@@ -119,6 +119,7 @@ Vessels VesselsOf(vtkPolyData* trees, int tree, double edge, vtkMessageTrap& mes
   sweep->SetMinimumEdgeLength(0.01);
   sweep->SetMaximumEdgeLength(10.0);
   sweep->SetCurvatureWeight(0.0);
+  sweep->SetSharpestBend(0.5);
   UpdateAtTime(sweep, 0, 0.0, messages, [](double) {});
   vtkPolyData* wall = sweep->GetOutput();
   vtkPolyData* caps = sweep->GetCaps();

@@ -304,6 +304,7 @@ void SweepSettings::Validate() const
   require(std::isfinite(this->curvatureWeight) && this->curvatureWeight >= 0.0,
     "curvatureWeight must be at least 0");
   require(Within(this->edgeLengthPerRadius, 0.1, 0.7), "edgeLengthPerRadius must be 0.1 to 0.7");
+  require(Within(this->sharpestBend, 0.05, 1.0), "sharpestBend must be 0.05 to 1");
   require(Within(this->gradation, 0.05, 1.0), "gradation must be 0.05 to 1");
   require(Within(this->blending, 0.1, 1.0), "blending must be 0.1 to 1");
   require(Within(this->edgeRetreat, 0.1, 2.0), "edgeRetreat must be 0.1 to 2");

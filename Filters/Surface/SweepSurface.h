@@ -39,7 +39,9 @@ struct SweepSettings
   double maximumEdgeLength = 0.7;   ///< hmax of Eq. 4, mm
   double curvatureWeight = 1.0;     ///< alpha of Eq. 4, mm
   double edgeLengthPerRadius = 0.5; ///< greatest edge in radii, 0.1 to 0.7
-  double gradation = 0.25;          ///< greatest change of the edge length per length, 0.05 to 1
+  double sharpestBend =
+    0.12; ///< least radius of the wall's bends that edges follow, in radii, 0.05 to 1
+  double gradation = 0.25;   ///< greatest change of the edge length per length, 0.05 to 1
   double blending = 0.5;     ///< radius of the fillets in radii of the smaller vessel, 0.1 to 1
   double edgeRetreat = 0.15; ///< edges between two vessels in an acute angle move at least so far
                              ///< where the fillets have faded, in radii of the smaller vessel, 0.1

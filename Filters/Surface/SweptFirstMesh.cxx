@@ -416,7 +416,7 @@ double SweptEdgeLength(const SweepSettings& settings, double curvature, double r
     (settings.maximumEdgeLength - settings.minimumEdgeLength) *
       std::exp(-settings.curvatureWeight * curvature);
   // Where the wall is more bent than the vessel is thin, its own radius counts.
-  const double bend = std::max(1.0 / curvature, 0.12 * radius);
+  const double bend = std::max(1.0 / curvature, settings.sharpestBend * radius);
   return std::min(h, settings.edgeLengthPerRadius * std::min(radius, bend));
 }
 

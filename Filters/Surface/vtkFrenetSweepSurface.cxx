@@ -521,6 +521,7 @@ int vtkFrenetSweepSurface::RequestData(
     settings.maximumEdgeLength = this->MaximumEdgeLength;
     settings.curvatureWeight = this->CurvatureWeight;
     settings.edgeLengthPerRadius = this->EdgeLengthPerRadius;
+    settings.sharpestBend = this->SharpestBend;
     settings.blending = this->Blending;
     settings.smoothing = this->Smoothing;
     settings.capped = this->Capping;
@@ -574,6 +575,7 @@ void vtkFrenetSweepSurface::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "MaximumEdgeLength: " << this->MaximumEdgeLength << "\n";
   os << indent << "CurvatureWeight: " << this->CurvatureWeight << "\n";
   os << indent << "EdgeLengthPerRadius: " << this->EdgeLengthPerRadius << "\n";
+  os << indent << "SharpestBend: " << this->SharpestBend << "\n";
   os << indent << "Blending: " << this->Blending << "\n";
   os << indent << "Smoothing: " << this->Smoothing << "\n";
   os << indent << "Capping: " << this->Capping << "\n";

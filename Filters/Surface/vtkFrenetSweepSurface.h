@@ -189,6 +189,15 @@ public:
 
   ///@{
   /**
+   * Where the wall is more bent than the vessel is thin, the bend's own radius takes the place of the vessel's; but at least
+   * this share of it, 0.05 to 1. Default 0.12.
+   */
+  vtkSetMacro(SharpestBend, double);
+  vtkGetMacro(SharpestBend, double);
+  ///@}
+
+  ///@{
+  /**
    * Radius of the fillets between vessels in radii of the smaller one, 0.1 to 1. Default 0.5.
    */
   vtkSetMacro(Blending, double);
@@ -260,6 +269,7 @@ private:
   double MaximumEdgeLength = 0.7;
   double CurvatureWeight = 1.0;
   double EdgeLengthPerRadius = 0.5;
+  double SharpestBend = 0.12;
   double Blending = 0.5;
   double Smoothing = 0.5;
   bool Capping = true;

@@ -16,7 +16,7 @@ constexpr double MouthBegins =
   1.0; // parent's radii along a side branch, within which it is the parent's
 constexpr double MouthEnds = 3.0;
 
-double SmoothStep(double x)
+double CubicStep(double x)
 {
   const double t = std::clamp(x, 0.0, 1.0);
   return t * t * (3.0 - 2.0 * t);
@@ -255,7 +255,7 @@ WallSections::WallSections(const WallTopology& topology, const std::vector<Vecto
     const double mouth =
       topology.axisRadius[parent][NearestPoint(topology.axis[parent], topology.axis[b].front())];
     hold.share =
-      static_cast<float>(SmoothStep((along / mouth - MouthBegins) / (MouthEnds - MouthBegins)));
+      static_cast<float>(CubicStep((along / mouth - MouthBegins) / (MouthEnds - MouthBegins)));
     if (hold.share < 1.0F)
     {
       squared = Far;

@@ -212,6 +212,28 @@ TEST(SweepSurface, EdgesFollowEquation4)
     0.12 * expected * expected);
 }
 
+TEST(SweepSurface, EdgesFollowBendsAsFarAsAsked)
+{
+  const double daughter = 1.2;
+  std::vector<double> shortest;
+  for (const double bend : { 0.12, 0.5 })
+  {
+    SweepSettings settings;
+    settings.maximumEdgeLength = 10.0;
+    settings.curvatureWeight = 0.0;
+    settings.sharpestBend = bend;
+    const SweptSurface surface = SweepVesselTree(Fork(25.0, 1.5, daughter), settings);
+    EXPECT_TRUE(FindSelfIntersections(surface.points, surface.triangles, 1).empty());
+    shortest.push_back(*std::min_element(surface.edgeLength.begin(), surface.edgeLength.end()));
+    // What is asked for, less what grading takes.
+    EXPECT_GT(shortest.back(), 0.9 * settings.edgeLengthPerRadius * bend * daughter);
+  }
+  EXPECT_GT(shortest[1], 2.0 * shortest[0]);
+  SweepSettings none;
+  none.sharpestBend = 0.0;
+  EXPECT_THROW(SweepVesselTree(Fork(25.0, 1.5, daughter), none), std::invalid_argument);
+}
+
 TEST(SweepSurface, QuarterTorus)
 {
   const double bend = 8.0;
