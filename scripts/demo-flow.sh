@@ -54,7 +54,7 @@ if [ ! -e "$output/run/motion/skeleton.vtp.series" ]; then
   scripts/demo.sh --no-install --no-pictures -j "$jobs"
 fi
 
-steps=1000
+steps=500
 cycles=2
 if [ "$short" = yes ]; then
   cycles=1
@@ -72,7 +72,7 @@ for walls in moving rest; do
   fi
   if [ ! -e "$folder/mesh_openfoam.json" ]; then
     echo "== A coarse mesh for flow, walls: $walls"
-    "$pipeline" sequence "$output/run" --formats openfoam --flow-tree "$tree" --flow-edge 0.5 --flow-layers 4 \
+    "$pipeline" sequence "$output/run" --formats openfoam --flow-tree "$tree" --flow-edge 0.65 --flow-layers 3 --flow-extension 0.5 \
       --flow-cycles "$cycles" --flow-steps "$steps" --flow-frames 100 "${still[@]}" --output "$folder"
   fi
   found=("$folder"/mesh_openfoam_*/)
