@@ -8,8 +8,9 @@ namespace coronary
 {
 namespace
 {
-constexpr double PressureTime = 2.0; // s of the running means
-constexpr double Relaxed = 0.5;      // atm: what is below is another inflation
+constexpr double PressureTime = 2.0;    // s of the running means
+constexpr double ThinnestGraded = 0.75; // mm, radius without the lesion, as in docs/lesions.md
+constexpr double Relaxed = 0.5;         // atm: what is below is another inflation
 }
 
 LesionWatch::LesionWatch(const WallTopology& topology, const ContrastModel& medium)
@@ -28,6 +29,10 @@ LesionWatch::LesionWatch(const WallTopology& topology, const ContrastModel& medi
     const FlowBranch& along = medium.FlowModel().Network().Branches()[branch];
     one.distal = { branch, along.abscissa[last - this->First[branch]] };
     one.reference = this->Reference[lesion.branch][lesion.throat - this->First[lesion.branch]];
+    if (one.reference < ThinnestGraded)
+    {
+      continue;
+    }
     one.reserveBefore = medium.FlowModel().FlowReserveAt(one.distal);
     one.lesion = std::move(lesion);
     this->Lesions.push_back(std::move(one));

@@ -1,5 +1,7 @@
 #include "VesselLesions.h"
 
+#include "PhantomMotion.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,16 +13,9 @@ namespace
 {
 constexpr double LesionEdge = 0.1; // of the diameter
 constexpr double LookAhead = 5.0;  // mm behind a bifurcation, where a branch has its own calibre
-
-constexpr double MouthBegins =
-  1.0; // parent's radii along a side branch, within which it is the parent's
+// Parent's radii along a side branch: up to there the wall is the parent's, from there on its own.
+constexpr double MouthBegins = 1.0;
 constexpr double MouthEnds = 3.0;
-
-double CubicStep(double x)
-{
-  const double t = std::clamp(x, 0.0, 1.0);
-  return t * t * (3.0 - 2.0 * t);
-}
 
 double RadiusAhead(const WallTopology& topology, int branch)
 {

@@ -1,7 +1,9 @@
 #include "VesselModel.h"
 
+#include "BoundedJson.h"
 #include "ContractionMotion.h"
 #include "FileSeries.h"
+#include "TextFile.h"
 #include "WallMotions.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkDataFiles.h"
@@ -37,6 +39,7 @@ namespace fs = std::filesystem;
 namespace names = vtkCoronaryArrayNames;
 
 constexpr int PhantomPhases = 40;
+constexpr double Irregular = 0.1; // of the healthy radius: what is less narrow is no lesion
 constexpr int SampledPhases = 40; // of a motion that hangs on a skeleton
 
 [[noreturn]] void Fail(const std::string& path, const std::string& what)
@@ -166,6 +169,15 @@ std::map<int, int> TakeTree(vtkPolyData* tree, const std::string& path, WallTopo
         "'");
   }
   const VesselTree vessels = vtkCoronary::BranchesOf(tree, radius);
+  // What the run found of lesions, where it did: the radius without them, and the number of the calcium beside.
+  const auto pointValues = [&](const char* name)
+  {
+    vtkDataArray* array = tree->GetPointData()->GetArray(name);
+    const bool fits = array && array->GetNumberOfTuples() == tree->GetNumberOfPoints();
+    return fits ? vtkCoronary::BranchesOf(tree, array).radius : std::vector<double>();
+  };
+  const std::vector<double> healthy = pointValues(names::ReferenceRadius);
+  const std::vector<double> calcium = pointValues(names::CalciumLabel);
   std::map<int, int> branchOf;
   for (const VesselTree::Branch& branch : vessels.branches)
   {
@@ -175,6 +187,8 @@ std::map<int, int> TakeTree(vtkPolyData* tree, const std::string& path, WallTopo
     }
     std::vector<Vector3> axis;
     std::vector<double> radii;
+    std::vector<double> references;
+    std::vector<double> labels;
     for (const std::int64_t p : branch.points)
     {
       // Where two points fall together there is no direction.
@@ -183,10 +197,21 @@ std::map<int, int> TakeTree(vtkPolyData* tree, const std::string& path, WallTopo
       {
         axis.push_back(point);
         radii.push_back(vessels.radius[static_cast<std::size_t>(p)]);
+        const double reference =
+          healthy.size() == vessels.points.size() ? healthy[static_cast<std::size_t>(p)] : 0.0;
+        references.push_back(
+          radii.back() < (1.0 - Irregular) * reference ? reference : radii.back());
+        labels.push_back(
+          calcium.size() == vessels.points.size() ? calcium[static_cast<std::size_t>(p)] : 0.0);
       }
     }
     topology.axis.push_back(std::move(axis));
     topology.axisRadius.push_back(std::move(radii));
+    if (!healthy.empty())
+    {
+      topology.axisReference.push_back(std::move(references));
+      topology.axisCalcium.push_back(std::move(labels));
+    }
     topology.groupName.push_back(branch.name);
   }
   for (const VesselTree::Branch& branch : vessels.branches)
@@ -458,6 +483,35 @@ bool Moves(const std::string& list, vtkMessageTrap& messages)
   return false;
 }
 
+/// Degrees of the section that calcium takes, in place of its number.
+void TakeCalcium(const std::string& folder, WallTopology& topology)
+{
+  std::map<int, double> arcs;
+  const std::string report = (fs::path(folder) / "report.json").string();
+  if (IsFile(report))
+  {
+    const nlohmann::json json =
+      ParseBoundedJson(ReadTextFile(report, "a report"), "'" + report + "'");
+    const nlohmann::json objects = json.value(
+      nlohmann::json::json_pointer("/centerline/calcium/objects"), nlohmann::json::array());
+    for (const nlohmann::json& object : objects)
+    {
+      if (object.is_object())
+      {
+        arcs[object.value("label", 0)] = std::clamp(object.value("arc_deg", 0.0), 0.0, 360.0);
+      }
+    }
+  }
+  for (std::vector<double>& branch : topology.axisCalcium)
+  {
+    for (double& calcium : branch)
+    {
+      const auto arc = arcs.find(static_cast<int>(calcium));
+      calcium = arc == arcs.end() ? 0.0 : arc->second;
+    }
+  }
+}
+
 VesselModel LoadRun(
   const VesselSource& source, vtkMessageTrap& messages, const ProgressCallback& progress)
 {
@@ -474,8 +528,9 @@ VesselModel LoadRun(
   const std::string surface = tracked ? FileOfRun(source.path, "volume_boundary.vtp", "volume")
     : IsFile(boundary)                ? boundary
                                       : FileOfRun(source.path, "surface.vtp", "surface");
-  const RestingWall wall =
+  RestingWall wall =
     ReadWall(surface, FileOfRun(source.path, "centerline.vtp", "centerline"), messages, progress);
+  TakeCalcium(source.path, wall.topology);
   model.heart = wall.heart;
   if (tracked)
   {
@@ -500,9 +555,12 @@ VesselModel LoadVessels(const VesselSource& source, const ProgressCallback& prog
     case VesselSource::Kind::Run:
       return LoadRun(source, messages, progress);
     case VesselSource::Kind::Surface:
-      MakeStillOrContracting(
-        source, StillWall(ReadWall(source.path, source.centerline, messages, progress)), model);
+    {
+      RestingWall wall = ReadWall(source.path, source.centerline, messages, progress);
+      TakeCalcium("", wall.topology);
+      MakeStillOrContracting(source, StillWall(wall), model);
       return model;
+    }
     default:
       break;
   }

@@ -344,6 +344,42 @@ TEST_F(TestCoronarySimulator, AScriptedWithdrawalResistsThePullAndTheGuideAddsTo
     smooth[0], smooth[1], smooth[2], rough[0], rough[1], rough[2]);
 }
 
+TEST_F(TestCoronarySimulator, TellsOfLesionsAndOfTheBalloon)
+{
+  const auto lesion = [](const char* vessel, double degree) {
+    return json{ { "vessel", vessel }, { "at_mm", 10 }, { "length_mm", 8 }, { "degree", degree } };
+  };
+  json scenario = TestScenario();
+  scenario["balloon"] = "semi-compliant-2.5x15";
+  scenario["lesions"] = { lesion("pRCA", 0.5) };
+  this->Put("lesion.json", scenario);
+  ASSERT_EQ(
+    this->Run(
+      "--headless --scenario lesion.json --script drive.json --record a.pcirec --output out"),
+    0)
+    << this->Said();
+  const json found = this->Statistics("out")["lesions"];
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0]["vessel"], "pRCA");
+  EXPECT_NEAR(found[0]["stenosis_percent"].get<double>(), 50.0, 1.0);
+  EXPECT_LT(found[0]["ffr"].get<double>(), 1.0);
+  EXPECT_NE(ReadText(this->Folder / "out" / "balloon.csv").find("pressure_atm"), std::string::npos);
+  EXPECT_EQ(this->Run("--headless --replay a.pcirec --verify"), 0) << this->Said();
+  EXPECT_EQ(this->Run("--headless --scenario s.json --ticks 10 --output out"), 0);
+  EXPECT_FALSE(fs::exists(this->Folder / "out" / "balloon.csv")) << "of the session before";
+
+  this->ExpectBadScenario([&](json& s) { s["lesions"] = { lesion("mLAD", 0.5) }; }, "no 'mLAD'");
+  this->ExpectBadScenario([&](json& s) { s["lesions"] = { lesion("pRCA", 0.99) }; }, "'degree'");
+  this->ExpectBadScenario([](json& s) { s["balloon"] = "none"; }, "has no balloon 'none'");
+  this->ExpectBadScenario(
+    [](json& s)
+    {
+      s["catheter"] = "JR4-4F";
+      s["balloon"] = "non-compliant-3.5x12";
+    },
+    "is thicker");
+}
+
 TEST_F(TestCoronarySimulator, RefusesInstrumentsThatDoNotFit)
 {
   // A wire as thick as the catheter, and a catheter as thick as the vessel.
@@ -398,7 +434,7 @@ TEST_F(TestCoronarySimulator, NamesTheProgramForPosing)
 TEST_F(TestCoronarySimulator, PrintsWhatItKnows)
 {
   ASSERT_EQ(this->Run("--list-scenarios"), 0);
-  for (const char* name : { "phantom-lca", "phantom-rca", "hra-lca" })
+  for (const char* name : { "phantom-lca", "phantom-rca", "hra-lca", "lad-lesion" })
   {
     EXPECT_NE(ReadText(this->Folder / "stdout").find(name), std::string::npos);
   }

@@ -1,5 +1,6 @@
 // Vessels out of a run's files: the right points move with the right bones, and what is broken is named.
 #include "Scenario.h"
+#include "VesselLesions.h"
 #include "VesselModel.h"
 
 #include "VesselTestData.h"
@@ -62,6 +63,38 @@ protected:
 
   fs::path Folder;
 };
+}
+
+TEST_F(TestVesselModel, KnowsTheLesionsOfTheRun)
+{
+  EXPECT_TRUE(this->Load().wall->Topology().axisReference.empty()) << "an older run has none";
+  auto tree = ChainTree(Bones);
+  vtkNew<vtkDoubleArray> healthy;
+  healthy->SetName("ReferenceRadius");
+  vtkNew<vtkIntArray> calcium;
+  calcium->SetName("CalciumLabel");
+  for (vtkIdType n = 0; n < tree->GetNumberOfPoints(); ++n)
+  {
+    const bool narrow = n > 7 && n < 12;
+    tree->GetPointData()->GetArray(0)->SetComponent(n, 0, narrow ? 0.6 : 1.5);
+    healthy->InsertNextValue(n == 3 ? 1.55 : 1.5);
+    calcium->InsertNextValue(n == 9 ? 2 : 0);
+  }
+  tree->GetPointData()->AddArray(healthy);
+  tree->GetPointData()->AddArray(calcium);
+  Save(vtkNew<vtkXMLPolyDataWriter>(), tree, this->Folder / "centerline.vtp");
+  std::ofstream(this->Folder / "report.json")
+    << R"({"centerline": {"calcium": {"objects": [{"label": 2, "arc_deg": 140.0}]}}})";
+  const coronary::WallTopology topology = this->Load().wall->Topology();
+  ASSERT_EQ(topology.axisReference.size(), 1U);
+  EXPECT_EQ(topology.axisReference[0][3], 1.5) << "irregular, but no lesion";
+  EXPECT_EQ(topology.axisCalcium[0][9], 140.0);
+  EXPECT_EQ(topology.axisCalcium[0][8], 0.0);
+  const std::vector<coronary::FoundLesion> lesions = coronary::FindLesions(topology);
+  ASSERT_EQ(lesions.size(), 1U);
+  EXPECT_EQ(lesions[0].vessel, "pRCA");
+  EXPECT_NEAR(lesions[0].degree, 0.6, 1e-12);
+  EXPECT_EQ(lesions[0].points.size(), 4U);
 }
 
 TEST_F(TestVesselModel, MovesWithItsSkeleton)
