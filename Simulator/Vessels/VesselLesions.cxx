@@ -250,7 +250,7 @@ WallSections::WallSections(const WallTopology& topology, const std::vector<Vecto
     const double mouth =
       topology.axisRadius[parent][NearestPoint(topology.axis[parent], topology.axis[b].front())];
     hold.share =
-      static_cast<float>(CubicStep((along / mouth - MouthBegins) / (MouthEnds - MouthBegins)));
+      static_cast<float>(SmoothStep((along / mouth - MouthBegins) / (MouthEnds - MouthBegins)));
     if (hold.share < 1.0F)
     {
       squared = Far;
