@@ -68,7 +68,7 @@ public:
 TEST(UnitTestScenario, BuiltInOnesAreGood)
 {
   const auto list = coronary::BuiltInScenarios();
-  ASSERT_EQ(list.size(), 3U);
+  ASSERT_EQ(list.size(), 4U);
   for (const auto& one : list)
   {
     const Scenario scenario = LoadScenario(one.name);
@@ -82,6 +82,12 @@ TEST(UnitTestScenario, BuiltInOnesAreGood)
   EXPECT_EQ(atlas.vessels.kind, VesselSource::Kind::Run);
   EXPECT_TRUE(atlas.vessels.path.empty());
   EXPECT_EQ(atlas.vessels.motion, coronary::VesselMotion::Contraction);
+  EXPECT_FALSE(atlas.balloon);
+  const Scenario lesion = LoadScenario("lad-lesion");
+  ASSERT_TRUE(lesion.balloon);
+  EXPECT_NO_THROW(lesion.balloon->Validate());
+  ASSERT_EQ(lesion.lesions.size(), 1U);
+  EXPECT_EQ(lesion.lesions[0].degree, 0.7);
 }
 
 TEST(UnitTestScenario, TextSaysEverythingToTheBit)
@@ -104,6 +110,8 @@ TEST(UnitTestScenario, TextSaysEverythingToTheBit)
       EXPECT_EQ(again.catheter.shape[n].curvature, scenario.catheter.shape[n].curvature);
     }
     EXPECT_EQ(again.vessels.contraction.twist, scenario.vessels.contraction.twist);
+    EXPECT_EQ(again.balloon.has_value(), scenario.balloon.has_value());
+    EXPECT_EQ(again.lesions.size(), scenario.lesions.size());
   }
 }
 
