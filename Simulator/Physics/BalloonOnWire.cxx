@@ -14,6 +14,7 @@ constexpr double FrictionGives = 0.05; // mm after which the sleeve slides on th
 constexpr double TipBlend = 1.0;       // mm on which the wire's radius becomes the tip's
 // The wall takes an opened balloon's shape, and the rod's contacts do not know: for them it is thinner.
 constexpr double FeltOpening = 0.75;
+constexpr double Slack = 0.05;      // mm, likewise of what is folded: it holds narrow vessels open
 constexpr double MostCarried = 2.0; // mm in a key frame, by the wall that holds it
 constexpr double MegapascalPerAtm = 0.101325;
 constexpr double HighestPressure = 60.0; // atm
@@ -153,7 +154,8 @@ bool BalloonOnWire::Drive(double way, double most, const Rail& rail, double shar
     const double bare = (*rail.segments)[i].radius;
     const double blend = std::min(1.0, behind / TipBlend);
     const double folded = this->Balloon.FoldedRadius(behind);
-    const double outside = folded + FeltOpening * std::max(0.0, this->RadiusAt(behind) - folded);
+    const double outside =
+      folded - Slack + FeltOpening * std::max(0.0, this->RadiusAt(behind) - folded);
     rod.SetRadius(i, here ? bare + blend * std::max(0.0, outside - bare) : bare);
     rod.SetForce(i, here ? Vector3(-drag * rod.Axis(i)) : Vector3(Vector3::Zero()));
     if (i == 0)
