@@ -377,7 +377,7 @@ double CoronaryFlow::MeanAorticPressure() const
   return mean;
 }
 
-double CoronaryFlow::FlowReserveAt(const CatheterTip& place) const
+std::vector<double> CoronaryFlow::FlowReserves(const std::vector<CatheterTip>& places) const
 {
   constexpr int MostSteps = 200;
   CoronaryFlow steady = *this;
@@ -387,18 +387,20 @@ double CoronaryFlow::FlowReserveAt(const CatheterTip& place) const
     resistance /= FlowReserve;
   }
   const double aortic = this->MeanAorticPressure();
-  double pressure = 0.0;
-  for (int k = 0; k < MostSteps; ++k)
+  std::vector<double> reserves(places.size(), 0.0);
+  bool moved = !places.empty();
+  for (int k = 0; k < MostSteps && moved; ++k)
   {
     steady.SolveSteady(aortic);
-    const double before = pressure;
-    pressure = steady.PressureAt(place);
-    if (std::abs(pressure - before) < 1e-12 * aortic)
+    moved = false;
+    for (std::size_t n = 0; n < places.size(); ++n)
     {
-      break;
+      const double reserve = steady.PressureAt(places[n]) / aortic;
+      moved = moved || std::abs(reserve - reserves[n]) >= 1e-12;
+      reserves[n] = reserve;
     }
   }
-  return pressure / aortic;
+  return reserves;
 }
 
 double CoronaryFlow::ResistanceTo(int branch, double abscissa) const

@@ -146,9 +146,9 @@ public:
   void SetLumen(const std::vector<double>& radius, const std::vector<double>& instrument);
   /// mmHg now, at a place.
   double PressureAt(const CatheterTip& place) const;
-  /// Fractional flow reserve: mean pressure at a place over the aortic one in steady flow, with the outlets' resistance a
-  /// quarter of what it is at rest (hyperaemia).
-  double FlowReserveAt(const CatheterTip& place) const;
+  /// Fractional flow reserves: mean pressure at places over the aortic one in steady flow, with the outlets' resistance a
+  /// quarter of what it is at rest (hyperaemia). The lumen alone decides. It takes some milliseconds.
+  std::vector<double> FlowReserves(const std::vector<CatheterTip>& places) const;
   ///@}
 
   /// Over the bits of all that the next step depends on. @param before  the digest to go on from

@@ -27,16 +27,16 @@ LesionWatch::LesionWatch(const WallTopology& topology, const ContrastModel& medi
     const std::int64_t last = lesion.points.back();
     const int branch = this->BranchOf(last);
     const FlowBranch& along = medium.FlowModel().Network().Branches()[branch];
-    one.distal = { branch, along.abscissa[last - this->First[branch]] };
     one.reference = this->Reference[lesion.branch][lesion.throat - this->First[lesion.branch]];
     if (one.reference < ThinnestGraded)
     {
       continue;
     }
-    one.reserveBefore = medium.FlowModel().FlowReserveAt(one.distal);
+    this->Distal.push_back({ branch, along.abscissa[last - this->First[branch]] });
     one.lesion = std::move(lesion);
     this->Lesions.push_back(std::move(one));
   }
+  this->Reserve = this->ReserveBefore = medium.FlowModel().FlowReserves(this->Distal);
 }
 
 int LesionWatch::BranchOf(std::int64_t point) const
@@ -59,13 +59,21 @@ void LesionWatch::StepFlow(double seconds, const Intervention& instruments, Cont
       this->Filled_ = std::move(filled);
       this->Lumen_ = wall->Radii();
       medium.SetLumen(this->Lumen_, this->Filled_);
+      this->ReserveIsOld = true;
+    }
+    else if (this->ReserveIsOld)
+    {
+      // A network to be solved until it rests: not while a balloon moves or fills.
+      this->Reserve = medium.FlowModel().FlowReserves(this->Distal);
+      this->ReserveIsOld = false;
     }
   }
   const double share = -std::expm1(-seconds / PressureTime);
-  for (Watched& one : this->Lesions)
+  for (std::size_t n = 0; n < this->Lesions.size(); ++n)
   {
+    Watched& one = this->Lesions[n];
     const double aortic = medium.AorticPressure();
-    const double distal = medium.FlowModel().PressureAt(one.distal);
+    const double distal = medium.FlowModel().PressureAt(this->Distal[n]);
     const bool first = one.meanAortic == 0.0;
     one.meanAortic += (first ? 1.0 : share) * (aortic - one.meanAortic);
     one.meanDistal += (first ? 1.0 : share) * (distal - one.meanDistal);
@@ -119,10 +127,14 @@ std::vector<LesionResult> LesionWatch::Results(
   const Intervention& instruments, const ContrastModel& medium) const
 {
   const DilatableWall* wall = instruments.Dilated();
+  const std::vector<double> reserve =
+    this->ReserveIsOld ? medium.FlowModel().FlowReserves(this->Distal) : this->Reserve;
   std::vector<LesionResult> results;
-  for (const Watched& one : this->Lesions)
+  for (std::size_t n = 0; n < this->Lesions.size(); ++n)
   {
+    const Watched& one = this->Lesions[n];
     LesionResult result;
+    result.branch = one.lesion.branch;
     result.vessel = one.lesion.vessel;
     result.reference = 2.0 * one.reference;
     result.degreeBefore = result.degree = one.lesion.degree;
@@ -141,8 +153,8 @@ std::vector<LesionResult> LesionWatch::Results(
       }
     }
     result.pressureRatio = one.meanAortic > 0.0 ? one.meanDistal / one.meanAortic : 0.0;
-    result.reserveBefore = one.reserveBefore;
-    result.reserve = medium.FlowModel().FlowReserveAt(one.distal);
+    result.reserveBefore = this->ReserveBefore[n];
+    result.reserve = reserve[n];
     result.stretch = one.stretch;
     results.push_back(std::move(result));
   }

@@ -17,6 +17,7 @@ namespace coronary
 struct LesionResult
 {
   std::string vessel;
+  int branch = 0;             ///< with the narrowest place
   double reference = 0.0;     ///< mm, diameter without the lesion at its narrowest place
   double least = 0.0;         ///< mm, diameter now
   double degreeBefore = 0.0;  ///< of the diameter, when the session began
@@ -67,9 +68,7 @@ private:
   struct Watched
   {
     FoundLesion lesion;
-    CatheterTip distal;
     double reference = 0.0; ///< mm, radius
-    double reserveBefore = 0.0;
     double stretch = 0.0;
     double meanDistal = 0.0; ///< mmHg
     double meanAortic = 0.0;
@@ -77,6 +76,10 @@ private:
   int BranchOf(std::int64_t point) const;
 
   std::vector<Watched> Lesions;
+  std::vector<CatheterTip> Distal; ///< place behind each lesion
+  std::vector<double> ReserveBefore;
+  std::vector<double> Reserve;                ///< of the lumen when it last stayed for a step
+  bool ReserveIsOld = false;                  ///< the lumen has changed since
   std::vector<std::int64_t> First;            ///< point of each branch
   std::vector<std::vector<double>> Reference; ///< mm, radii
   std::vector<std::string> Names;             ///< of branches

@@ -390,7 +390,7 @@ TEST(LesionFlow, ReserveIsTheRootOfTheNetwork)
     const double linear = f + rm;
     const double q = (-linear + std::sqrt(linear * linear + 4.0 * s * (aortic - 5.0))) / (2.0 * s);
     const double expected = (5.0 + rm * q) / aortic;
-    const double reserve = flow.FlowReserveAt({ 0, 80.0 });
+    const double reserve = flow.FlowReserves({ { 0, 80.0 } })[0];
     EXPECT_NEAR(reserve, expected, 1e-9);
     EXPECT_LT(reserve, before);
     before = reserve;
@@ -413,7 +413,7 @@ TEST(LesionFlow, FollowsTheLumenAndWhatIsInIt)
   const double rm = flow.OutletResistance(1) / 4.0;
   const double share = rm / (flow.SegmentResistance(0) + rm); // nothing is lost in a jet any more
   EXPECT_NEAR(
-    (flow.FlowReserveAt({ 0, 80.0 }) - share) / (1.0 - share), 5.0 / MeanAortic(flow), 1e-9);
+    (flow.FlowReserves({ { 0, 80.0 } })[0] - share) / (1.0 - share), 5.0 / MeanAortic(flow), 1e-9);
   flow.SetLumen(tube.axisRadius[0], none);
   EXPECT_DOUBLE_EQ(flow.SegmentResistance(0), narrow);
 
