@@ -158,16 +158,20 @@ auto& Named(const List& list, const std::string& wanted, const char* what,
   throw std::invalid_argument(origin + " has no " + what + " '" + wanted + "'; it has " +
     (names.empty() ? "none" : names) + ".");
 }
+
+/// Of an instrument, for messages: " 'name'", or nothing.
+std::string QuotedName(const Json& object)
+{
+  return object.is_object() && object.contains("name") && object["name"].is_string()
+    ? " '" + object["name"].get<std::string>() + "'"
+    : "";
+}
 }
 
 CatalogueWire WireFromJson(const Json& object, const std::string& where)
 {
   CatalogueWire result;
-  const std::string name =
-    object.is_object() && object.contains("name") && object["name"].is_string()
-    ? " '" + object["name"].get<std::string>() + "'"
-    : "";
-  JsonFields fields(object, where + ": wire" + name);
+  JsonFields fields(object, where + ": wire" + QuotedName(object));
   result.wire.name = fields.Text("name");
   result.wire.source = fields.Text("source", "");
   result.description = fields.Text("description", "");
@@ -195,11 +199,7 @@ CatalogueCatheter CatheterFromJson(const Json& object, const std::string& where)
 {
   CatalogueCatheter result;
   GuideCatheter& catheter = result.catheter;
-  const std::string name =
-    object.is_object() && object.contains("name") && object["name"].is_string()
-    ? " '" + object["name"].get<std::string>() + "'"
-    : "";
-  JsonFields fields(object, where + ": catheter" + name);
+  JsonFields fields(object, where + ": catheter" + QuotedName(object));
   catheter.name = fields.Text("name");
   catheter.source = fields.Text("source", "");
   result.description = fields.Text("description", "");
@@ -236,11 +236,7 @@ CatalogueBalloon BalloonFromJson(const Json& object, const std::string& where)
 {
   CatalogueBalloon result;
   BalloonCatheter& balloon = result.balloon;
-  const std::string name =
-    object.is_object() && object.contains("name") && object["name"].is_string()
-    ? " '" + object["name"].get<std::string>() + "'"
-    : "";
-  JsonFields fields(object, where + ": balloon" + name);
+  JsonFields fields(object, where + ": balloon" + QuotedName(object));
   balloon.name = fields.Text("name");
   balloon.source = fields.Text("source", "");
   result.description = fields.Text("description", "");
