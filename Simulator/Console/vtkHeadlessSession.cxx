@@ -197,7 +197,7 @@ public:
   }
 
 private:
-  /// With the first lesion and the flow at its vessel's beginning.
+  /// With the first lesion, and the flow at the beginning of its branch; zeros without one.
   void AddBalloon(const TrainingSession& session, double seconds)
   {
     if (!session.Instruments().Balloon())
@@ -208,18 +208,13 @@ private:
     const BalloonReport& balloon = session.Instruments().Report().balloon;
     const std::vector<LesionResult> lesions = session.Lesions();
     const LesionResult first = lesions.empty() ? LesionResult() : lesions.front();
-    int branch = 0;
-    const std::vector<std::string>& names = session.Topology().groupName;
-    while (branch + 1 < static_cast<int>(names.size()) && names[branch] != first.vessel)
-    {
-      ++branch;
-    }
+    const double flow = lesions.empty() ? 0.0 : session.Contrast().Flow(first.branch);
     char text[320];
     std::snprintf(text, sizeof(text),
       "%llu,%.9g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n",
       static_cast<unsigned long long>(this->Tick), seconds, balloon.tip, balloon.pressure,
       balloon.least, balloon.greatest, balloon.force, balloon.grip, balloon.wallPressure,
-      first.least, 100.0 * first.degree, first.pressureRatio, session.Contrast().Flow(branch));
+      first.least, 100.0 * first.degree, first.pressureRatio, flow);
     this->Balloons += text;
   }
 
