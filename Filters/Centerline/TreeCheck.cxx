@@ -3,6 +3,7 @@
 #include "CoronaryAnatomy.h"
 #include "SegmentAtlas.h"
 #include "TreeLinks.h"
+#include "VeinRejection.h"
 #include "VesselTips.h"
 
 #include <algorithm>
@@ -498,12 +499,7 @@ void Checker::Veins()
   std::map<int, std::size_t> doubtOf; // of a group
   for (const VesselTree::Branch& branch : this->Tree.branches)
   {
-    // The first point is the parent's.
-    double probability = 0.0;
-    for (std::size_t i = 1; i < branch.points.size(); ++i)
-    {
-      probability = std::max(probability, this->Vein[branch.points[i]]);
-    }
+    const double probability = VeinProbabilityOf(branch.points, this->Vein);
     if (probability <= possible)
     {
       continue;
@@ -539,10 +535,7 @@ std::vector<TreeWarning> Checker::Run()
     this->Territories();
     this->Tips();
   }
-  if (!this->Vein.empty())
-  {
-    this->Veins();
-  }
+  this->Veins();
   return this->Warnings;
 }
 }

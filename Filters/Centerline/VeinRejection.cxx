@@ -939,4 +939,15 @@ std::vector<double> VeinProbabilityOfPoints(
   }
   return result;
 }
+
+double VeinProbabilityOf(
+  const std::vector<std::int64_t>& branch, const std::vector<double>& ofPoints)
+{
+  double greatest = 0.0;
+  for (std::size_t i = 1; i < branch.size() && !ofPoints.empty(); ++i)
+  {
+    greatest = std::max(greatest, ofPoints[static_cast<std::size_t>(branch[i])]);
+  }
+  return greatest;
+}
 }

@@ -52,6 +52,10 @@ std::vector<VeinBranch> JudgeBranches(const VesselTree& tree, const ImageInterpo
 /// @returns of each point, 0 to 1: the greatest of the branches from the root to its own one, for what hangs on a vein is one
 std::vector<double> VeinProbabilityOfPoints(
   const VesselTree& tree, const std::vector<VeinBranch>& judged);
+
+/// Of a branch, from those of points: the greatest but for its first point, which is its parent's; 0 where nothing is known.
+double VeinProbabilityOf(
+  const std::vector<std::int64_t>& branch, const std::vector<double>& ofPoints);
 }
 
 #endif

@@ -2,6 +2,7 @@
 
 #include "CyclicTime.h"
 #include "Require.h"
+#include "VeinRejection.h"
 
 #include <algorithm>
 #include <cmath>
@@ -36,17 +37,6 @@ double MeanOf(const std::vector<double>& values, const std::vector<std::int64_t>
     sum += values.empty() ? 1.0 : values[p];
   }
   return sum / static_cast<double>(line.size());
-}
-
-/// Greatest of what is known of a line's points but the first, which its parent has too; nothing: 0.
-double GreatestOf(const std::vector<double>& values, const std::vector<std::int64_t>& line)
-{
-  double greatest = 0.0;
-  for (std::size_t i = 1; i < line.size() && !values.empty(); ++i)
-  {
-    greatest = std::max(greatest, values[line[i]]);
-  }
-  return greatest;
 }
 
 double UnseenShare(const std::vector<TrackingStatus>& status, const std::vector<std::int64_t>& line)
@@ -154,7 +144,7 @@ std::vector<std::vector<PlacementSigns>> SignsOfPlacement(const Polylines& rest,
     PlacementSigns signs;
     signs.unclear = 1.0 - MeanOf(evidence.certainty, line);
     signs.doubtful = 1.0 - MeanOf(evidence.ostium, line);
-    signs.vein = GreatestOf(evidence.vein, line);
+    signs.vein = VeinProbabilityOf(line, evidence.vein);
     signs.swept = timing.window * Range(line, poses);
     double brightest = 0.0;
     double strays = 0.0;

@@ -1,5 +1,6 @@
-#include "Numbers.h"
 #include "SweptLumenBuild.h"
+
+#include "Numbers.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
-#include "Numbers.h"
 #include "SessionPictures.h"
 
 #include "HeartShell.h"
+#include "Numbers.h"
 #include "SessionImager.h"
 #include "vtkDisplay.h"
 #include "vtkPictureCanvas.h"

@@ -72,21 +72,6 @@ const CoronaryFlowSettings& Checked(const CoronaryFlowSettings& settings)
   settings.Validate();
   return settings;
 }
-
-double MaximumRadius(const std::vector<double>& abscissa, const std::vector<double>& radius,
-  std::size_t k, double from, double to)
-{
-  double maximum = radius[k];
-  for (std::size_t i = k; i > 0 && abscissa[i - 1] >= from; --i)
-  {
-    maximum = std::max(maximum, radius[i - 1]);
-  }
-  for (std::size_t i = k + 1; i < abscissa.size() && abscissa[i] <= to; ++i)
-  {
-    maximum = std::max(maximum, radius[i]);
-  }
-  return maximum;
-}
 }
 
 void CoronaryFlowSettings::Validate() const
@@ -197,7 +182,8 @@ CoronaryFlow::CoronaryFlow(const WallTopology& topology, const CoronaryFlowSetti
 void CoronaryFlow::FindStenoses()
 {
   const FlowNetwork& network = this->Network_;
-  const double near = this->Settings_.stenosisNeighbourhood;
+  const std::vector<std::vector<double>> references =
+    ReferenceRadii(network.Topology(), this->Settings_.stenosisNeighbourhood);
   for (std::size_t b = 0; b < network.Branches().size(); ++b)
   {
     const std::vector<double>& s = network.Branches()[b].abscissa;
@@ -219,8 +205,7 @@ void CoronaryFlow::FindStenoses()
     };
     for (std::size_t k = 0; k < s.size(); ++k)
     {
-      const double reference = std::min(MaximumRadius(s, radius, k, s[k] - near, s[k]),
-        MaximumRadius(s, radius, k, s[k], s[k] + near));
+      const double reference = references[b][k];
       if (radius[k] >= (1.0 - this->Settings_.stenosisThreshold) * reference)
       {
         close();

@@ -1,6 +1,7 @@
 #include "BalloonOnWire.h"
 
 #include "Fnv1a.h"
+#include "Numbers.h"
 
 #include <algorithm>
 #include <cmath>
@@ -225,7 +226,7 @@ double BalloonOnWire::FillAt(double pressure, const DilatableWall& wall)
   for (Section& section : this->Loaded)
   {
     this->Balance(section, pressure, wall);
-    volume += 1e-3 * M_PI * section.length *
+    volume += 1e-3 * Pi * section.length *
       (section.balloon * section.balloon - section.folded * section.folded);
   }
   return volume;
@@ -305,7 +306,7 @@ void BalloonOnWire::Inflate(double seconds, double pressure, double place, doubl
     if (section.pressed > 0.0)
     {
       wall.Hold(section.point, section.radius);
-      report.grip += this->Balloon.friction * MegapascalPerAtm * section.pressed * 2.0 * M_PI *
+      report.grip += this->Balloon.friction * MegapascalPerAtm * section.pressed * 2.0 * Pi *
         section.radius * section.length;
       report.wallPressure = std::max(report.wallPressure, section.pressed);
       report.stretch =

@@ -1,5 +1,6 @@
 #include "VesselLesions.h"
 
+#include "Numbers.h"
 #include "PhantomMotion.h"
 
 #include <algorithm>
@@ -363,7 +364,7 @@ void NarrowedWallMotion::Narrow(const VesselLesion& lesion)
     {
       continue;
     }
-    const double wave = std::cos(M_PI * away);
+    const double wave = std::cos(Pi * away);
     const double open = 1.0 - lesion.degree * wave * wave;
     const int b = way.branch[n];
     const auto k = static_cast<std::size_t>(way.points[n] - FirstAxisPoint(topology, b));
