@@ -14,6 +14,11 @@ namespace
 constexpr double MinimumFacing = 0.5;
 /// Triangles with a smaller angle are got rid of at the cost of uneven edges, degrees.
 constexpr double HardAngle = 16.0;
+/// Least angle that a collapse may leave, degrees. Edges far too short get more freedom, else heaps of tiny triangles stay
+/// within large ones: what is thin afterwards is flipped and smoothed.
+constexpr double CollapseAngle = 18.0;
+constexpr double TinyCollapseAngle = 6.0;
+constexpr double Tiny = 0.3; ///< of the wanted length
 }
 
 AdaptiveRemesher::AdaptiveRemesher(RemeshSurface& surface, std::vector<RemeshVertex> vertices,
@@ -301,7 +306,7 @@ bool AdaptiveRemesher::KeepsManifold(Index a, Index b, Index c, Index d) const
       ++degreeB;
       common += std::count(around, around + degreeA, this->To(e)) > 0 ? 1 : 0;
     });
-  if (common != 2 || degreeA + degreeB < 10)
+  if (common != 2 || degreeA + degreeB < 8)
   {
     return false;
   }
@@ -375,9 +380,12 @@ bool AdaptiveRemesher::GainsByMerging(
   {
     return false;
   }
+  const bool tiny =
+    (this->P(a) - this->P(b)).norm() < 0.5 * Tiny * (this->V[a].size + this->V[b].size);
+  const double least = -std::cos((tiny ? TinyCollapseAngle : CollapseAngle) * Degree);
   return !(unfold  ? facesAfter <= facedBefore
       : forQuality ? after <= before
-                   : after < std::min(before, -std::cos(18.0 * Degree)));
+                   : after < std::min(before, least));
 }
 
 bool AdaptiveRemesher::Collapse(Index h, bool forQuality, bool unfold)

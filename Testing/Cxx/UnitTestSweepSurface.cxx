@@ -234,6 +234,36 @@ TEST(SweepSurface, EdgesFollowBendsAsFarAsAsked)
   EXPECT_THROW(SweepVesselTree(Fork(25.0, 1.5, daughter), none), std::invalid_argument);
 }
 
+/// Large triangles of a mesh that began fine: no heap of tiny ones may stay between them.
+TEST(SweepSurface, CoarseForksHaveNoTinyEdges)
+{
+  SweepSettings settings;
+  settings.maximumEdgeLength = 10.0;
+  settings.curvatureWeight = 0.0;
+  settings.edgeLengthPerRadius = 0.65;
+  settings.sharpestBend = 0.5;
+  for (const double degrees : { 10.0, 25.0, 50.0, 80.0 })
+  {
+    for (const double daughter : { 0.6, 1.0, 1.5 })
+    {
+      const SweptSurface surface = SweepVesselTree(Fork(degrees, 2.0, daughter), settings);
+      double least = std::numeric_limits<double>::infinity();
+      for (std::size_t n = 0; n < surface.triangles.size(); ++n)
+      {
+        for (int k = 0; surface.entityId[n] == 1 && k < 3; ++k)
+        {
+          const std::int64_t a = surface.triangles[n][k];
+          const std::int64_t b = surface.triangles[n][(k + 1) % 3];
+          least = std::min(least,
+            (surface.points[a] - surface.points[b]).norm() /
+              (0.5 * (surface.edgeLength[a] + surface.edgeLength[b])));
+        }
+      }
+      EXPECT_GT(least, 0.3) << degrees << " degrees, daughters of " << daughter << " mm";
+    }
+  }
+}
+
 TEST(SweepSurface, QuarterTorus)
 {
   const double bend = 8.0;
