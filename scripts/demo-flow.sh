@@ -54,7 +54,7 @@ if [ ! -e "$output/run/motion/skeleton.vtp.series" ]; then
   scripts/demo.sh --no-install --no-pictures -j "$jobs"
 fi
 
-steps=1000
+steps=500
 cycles=2
 if [ "$short" = yes ]; then
   cycles=1

@@ -34,6 +34,7 @@ constexpr double CalciumHalo = 2.0; ///< blurs around an object that its bloomin
 constexpr double LevelUncertainty = 0.06;
 /// mm along a vessel that smoothing halves in the refined radii.
 constexpr double Wavelength = 3.0;
+constexpr double MouthReach = 2.0; ///< mm behind a mouth
 /// Degrees of the wall behind calcium beyond which nothing is measured.
 constexpr double MaximumArc = 180.0;
 constexpr double MinimumRays = 0.4; ///< share of rays that have to count
@@ -727,7 +728,8 @@ struct PathWork
   const VesselPath* path = nullptr;
   std::vector<double> expected; ///< mm
   std::vector<Vector3> tangents;
-  std::vector<char> skipped; ///< in a mouth, or bridged
+  std::size_t mouth = 0;     ///< sections at the beginning that lie in the parent's lumen
+  std::vector<char> skipped; ///< in the mouth, or at an ostium
   std::vector<char> besideCalcium;
   std::vector<Fit> fits;
 };
@@ -767,12 +769,14 @@ void Refiner::Prepare(
       InParent(this->tree, paths[path.parent], this->tree.points[p], 0.5 * this->tree.radius[p]);
     // At an ostium a part of the section is the aorta's.
     const bool atOstium = path.parent < 0 && path.arc[i] < 0.5 * this->tree.radius[p];
+    work.mouth += inMouth ? 1 : 0;
     work.skipped[i] = inMouth || atOstium ? 1 : 0;
     work.besideCalcium[i] = result.calcium[p] != 0 ? 1 : 0;
   }
 }
 
-/// Where calcium may have been taken for lumen the radius follows from the vessel before and behind it.
+/// Where calcium may have been taken for lumen the radius follows from the vessel before and behind it. Beside a mouth the
+/// tree's may be a slope that was carried on: a section there may be as wide as the vessel is a little farther on.
 std::vector<double> Refiner::ExpectedRadii(const PathWork& work) const
 {
   const VesselPath& path = *work.path;
@@ -785,6 +789,17 @@ std::vector<double> Refiner::ExpectedRadii(const PathWork& work) const
     radii[i] = this->tree.radius[path.points[i]];
     weights[i] = work.besideCalcium[i] != 0 ? 1e-3 : 1.0;
     any = any || work.besideCalcium[i] != 0;
+  }
+  if (work.mouth > 0 && work.mouth < count)
+  {
+    const double begin = path.arc[work.mouth];
+    const auto end = static_cast<std::size_t>(
+      std::lower_bound(path.arc.begin(), path.arc.end(), begin + MouthReach) - path.arc.begin());
+    const double behind = radii[std::min(end, count - 1)];
+    for (std::size_t i = 0; i < std::min(end, count); ++i)
+    {
+      radii[i] = std::max(radii[i], behind);
+    }
   }
   if (!any)
   {
@@ -931,13 +946,20 @@ void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
     const Fit& fit = work.fits[i];
     const bool own = i > 0 || path.parent < 0;
     radii[i] = this->tree.radius[p];
-    if (work.skipped[i] != 0)
+    if (i < work.mouth)
+    {
+      weights[i] = 1e-6;
+      shiftWeights[i] = 1e3;
+      unknown[i] = 1;
+    }
+    else if (work.skipped[i] != 0)
     {
       weights[i] = 1.0 / (0.04 + 0.01 * radii[i] * radii[i]);
       shiftWeights[i] = 1e3;
     }
     // Much wider than rays found it: a neighbour without a wall between, no lumen of its own.
-    else if (this->IsMeasured(fit) && fit.radius <= MaximumGrowth * radii[i] + 0.2)
+    else if (this->IsMeasured(fit) &&
+      fit.radius <= MaximumGrowth * std::max(radii[i], work.expected[i]) + 0.2)
     {
       radii[i] = fit.radius;
       weights[i] = 1.0 / (fit.deviation * fit.deviation + 0.0025);
@@ -981,7 +1003,7 @@ void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
   }
   if (total < 1e-3)
   {
-    return; // Nothing but calcium.
+    return; // Nothing was seen.
   }
   std::vector<double> smooth = SmoothSequence(radii, weights, Wavelength / step);
   std::vector<double> robust = weights;
@@ -1002,7 +1024,11 @@ void Refiner::Finish(const PathWork& work, RefinedLumen& result) const
   for (std::size_t i = path.FirstOwn(); i < count; ++i)
   {
     const std::int64_t p = path.points[i];
-    if (work.skipped[i] == 0)
+    if (i < work.mouth)
+    {
+      result.radius[p] = std::max(MinimumRadius, smooth[i]);
+    }
+    else if (work.skipped[i] == 0)
     {
       const bool bridged = IsBridged(this->tree, p);
       // What is no more than the measurements' error changes nothing.

@@ -31,8 +31,8 @@ struct RefinedLumen
 /**
  * Measures all sections of a tree anew.
  *
- * Sections in the mouth of a branch keep their radius; they are neither measured nor interpolated. Where the tree is
- * marked as bridged the radius does not get smaller than 0.25 mm, so that a vessel stays.
+ * Sections in the mouth of a branch, within its parent's lumen, are not measured: they are as wide as where it stands
+ * alone. Where the tree is marked as bridged the radius does not get smaller than 0.25 mm, so that a vessel stays.
  * @param blur  standard deviation of the image's blur, mm, positive
  * @throws std::invalid_argument as CheckTree, or for the blur; Cancelled
  */

@@ -265,6 +265,56 @@ TEST(LumenRefinement, AnOstiumKeepsItsRadius)
   }
 }
 
+TEST(LumenRefinement, AMouthIsAsWideAsWhereTheBranchStandsAlone)
+{
+  const double radius = 0.7;
+  const double trunk = 1.5;
+  Tube tube;
+  tube.radius = [=](double) { return radius; };
+  tube.Render();
+  // The branch begins on a trunk across it, with a slope that was carried on into its mouth, narrower or wider.
+  for (const double begin : { 0.2, 1.3 })
+  {
+    VesselTree tree;
+    const auto add =
+      [&](int id, int parent, const Vector3& from, const Vector3& to, const auto& width)
+    {
+      VesselTree::Branch branch;
+      branch.groupId = id;
+      branch.parentGroupId = parent;
+      if (parent >= 0)
+      {
+        branch.points.push_back(tree.branches[0].points.back());
+      }
+      const int steps = static_cast<int>((to - from).norm() / 0.25);
+      for (int i = parent >= 0 ? 1 : 0; i <= steps; ++i)
+      {
+        const double t = static_cast<double>(i) / steps;
+        branch.points.push_back(static_cast<std::int64_t>(tree.points.size()));
+        tree.points.push_back(from + t * (to - from));
+        tree.radius.push_back(width(t * (to - from).norm()));
+      }
+      tree.branches.push_back(branch);
+    };
+    const auto wide = [&](double) { return trunk; };
+    add(0, -1, Vector3(-6.0, 0.0, 5.0), Vector3(0.0, 0.0, 5.0), wide);
+    add(1, 0, Vector3(0.0, 0.0, 5.0), Vector3(6.0, 0.0, 5.0), wide);
+    add(2, 0, Vector3(0.0, 0.0, 5.0), Vector3(0.0, 0.0, 40.0),
+      [&](double along) { return begin + (radius - begin) * std::min(1.0, along / 4.0); });
+    MeasureTree(tree);
+    LumenLevels levels;
+    levels.level.assign(tree.points.size(), Lumen);
+    levels.background = Fat;
+    const RefinedLumen refined = RefineLumen(tree, VesselPaths(tree), tube.image, levels, {}, Blur);
+    const std::vector<std::int64_t>& points = tree.branches[2].points;
+    for (std::size_t i = 1; i < points.size(); ++i)
+    {
+      EXPECT_NEAR(refined.radius[points[i]], radius, 0.06)
+        << "begun with " << begin << ", at " << tree.points[points[i]][2] - 5.0;
+    }
+  }
+}
+
 TEST(StenosisGrading, DegreesAreThoseOfTheTube)
 {
   for (const double degree : { 0.4, 0.6, 0.75, 0.85 })
