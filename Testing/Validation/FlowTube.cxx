@@ -79,12 +79,17 @@ void Write(const Tube& tube, const coronary::LayeredMesh& mesh)
   flow.moving = tube.kind == "moving" || tube.kind == "pulsing";
   flow.cycle = tube.cycle;
   flow.stepsPerCycle = tube.steps;
-  flow.picturesPerCycle = 4;
+  flow.picturesPerCycle = tube.kind == "womersley" ? 20 : 4;
+  flow.cycles = tube.kind == "womersley" ? 3 : 1;
   const double nu = flow.viscosity / flow.density;
   const double speed = tube.reynolds * nu / (2e-3 * tube.radius);
   const double flowRate =
     tube.kind == "pulsing" ? 0.0 : M_PI * 1e-6 * tube.radius * tube.radius * speed;
   flow.inflow = { flowRate };
+  if (tube.kind == "womersley")
+  {
+    flow.inflow.insert(flow.inflow.end(), { 0.5 * flowRate, 0.0 });
+  }
   flow.outlets.push_back({ "outlet", 0.0, 0.0, 0.0 });
   coronary::StagedFolder folder(tube.output);
   const auto write = [&](const std::string& name, const std::string& text)
@@ -122,10 +127,12 @@ void Write(const Tube& tube, const coronary::LayeredMesh& mesh)
   const coronary::PolyhedralQuality quality = coronary::MeasurePolyhedra(mesh.cells, mesh.points);
   std::printf("{\"prisms\": %zu, \"tetrahedra\": %zu, \"volume\": %.17g, \"flow\": %.17g, \"nu\": "
               "%.17g, \"length\": %.17g, "
-              "\"radius\": %.17g, \"nonOrthogonality\": %.6g, \"skewness\": %.6g, \"sound\": %s}\n",
+              "\"radius\": %.17g, \"cycle\": %.17g, \"nonOrthogonality\": %.6g, \"skewness\": "
+              "%.6g, \"sound\": %s}\n",
     mesh.prisms.size(), mesh.tetrahedra.size(), 1e-9 * quality.totalVolume, flowRate, nu,
-    1e-3 * tube.length, 1e-3 * tube.radius, quality.maximumNonOrthogonality * 180.0 / M_PI,
-    quality.maximumSkewness, quality.IsSound() ? "true" : "false");
+    1e-3 * tube.length, 1e-3 * tube.radius, tube.cycle,
+    quality.maximumNonOrthogonality * 180.0 / M_PI, quality.maximumSkewness,
+    quality.IsSound() ? "true" : "false");
 }
 }
 
@@ -134,12 +141,13 @@ int main(int argc, char** argv)
   Tube tube;
   CLI::App app("A tube as a case for OpenFOAM");
   app.add_option("--kind", tube.kind)
-    ->check(CLI::IsMember({ "steady", "rest", "moving", "pulsing" }));
+    ->check(CLI::IsMember({ "steady", "rest", "moving", "pulsing", "womersley" }));
   app.add_option("--output", tube.output)->required();
   app.add_option("--edge", tube.edge, "Edges of the wall in radii");
   app.add_option("--layers", tube.layers);
   app.add_option("--thickness", tube.thickness);
   app.add_option("--length", tube.length, "mm");
+  app.add_option("--reynolds", tube.reynolds);
   app.add_option("--steps", tube.steps);
   app.add_option("--frames", tube.frames);
   CLI11_PARSE(app, argc, argv);
