@@ -27,7 +27,7 @@ OPTION = re.compile(r"(?<![\w/-])--[a-z][\w-]*")
 
 
 class Programs:
-    """The programs of a build tree, by their --help."""
+    """The programs of a build tree, by their --help, in the forms of CLI11 2.3 and of 2.5."""
 
     def __init__(self, folder):
         self.folder = folder
@@ -46,22 +46,23 @@ class Programs:
 
     def commands(self, program):
         """Names of the subcommands."""
-        part = self.help(program).partition("Subcommands:")[2]
-        return re.findall(r"^  ([a-z][\w-]*)", part, re.M)
+        part = re.split(r"^subcommands:", self.help(program), maxsplit=1, flags=re.M | re.I)[1:]
+        return re.findall(r"^  ([a-z][\w-]*)", part[0] if part else "", re.M)
 
     def options(self, program, command=""):
         """{option: default or None} without --help and --version."""
-        found = re.findall(r"^\s+(?:-\w,)?(--[a-z][\w-]*)([^\n]*)", self.help(program, command), re.M)
+        found = re.findall(r"^\s+(?:-\w,\s*)?(--[a-z][\w-]*)([^\n]*)", self.help(program, command), re.M)
         result = {}
         for name, rest in found:
-            default = re.search(r"^[^\n]*?\S=(\[[^\]]*\]|[^\s,]+)", rest.split("  ")[0])
+            head = rest.split("  ")[0]
+            default = re.search(r"^[^\n]*?\S=(\[[^\]]*\]|[^\s,]+)", head) or re.search(r" \[(\[[^\]]*\]|[^\]]*)\]", head)
             if name not in ("--help", "--help-all", "--version"):
                 result[name] = default.group(1) if default else None
         return result
 
     def unexplained(self, program, command=""):
         """Options without a text behind them: from column 30 on, or in the next line."""
-        found = re.findall(r"^(\s+(?:-\w,)?(--[a-z][\w-]*)[^\n]*)\n(?=([^\n]*))", self.help(program, command), re.M)
+        found = re.findall(r"^(\s+(?:-\w,\s*)?(--[a-z][\w-]*)[^\n]*)\n(?=([^\n]*))", self.help(program, command), re.M)
         return [name for line, name, below in found
                 if not re.match(r".{29} \S", line) and not re.match(r"\s{20,}\S", below)]
 
