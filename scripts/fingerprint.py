@@ -14,9 +14,9 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
-import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # Keys of JSON whose values tell of the run, not of its result.
@@ -93,18 +93,21 @@ def main():
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/paraview", help="build tree with the programs")
     parser.add_argument("--output", type=pathlib.Path, help="file for the list; default: standard output")
     parser.add_argument("--against", type=pathlib.Path, help="list that was made before")
-    parser.add_argument("--keep", type=pathlib.Path, help="folder for the files, to be looked at")
+    parser.add_argument("--keep", action="store_true", help="leave the files in build/fingerprint, to be looked at")
     arguments = parser.parse_args()
-    with tempfile.TemporaryDirectory() as scratch:
-        work = pathlib.Path(arguments.keep.resolve() if arguments.keep else scratch)
-        work.mkdir(parents=True, exist_ok=True)
-        make(arguments.build.resolve(), work)
-        found = {}
-        for path in sorted(work.rglob("*")):
-            if path.is_file() and not path.is_symlink():
-                code = hashlib.sha256(content(path, work)).hexdigest()[:16]
-                # A cohort's kept measures are called by a digest of their inputs' times.
-                found[str(path.relative_to(work).with_stem(code) if path.parent.name == "measures" else path.relative_to(work))] = code
+    # One place for all runs: packed recordings hold it.
+    work = ROOT / "build/fingerprint"
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir(parents=True)
+    make(arguments.build.resolve(), work)
+    found = {}
+    for path in sorted(work.rglob("*")):
+        if path.is_file() and not path.is_symlink():
+            code = hashlib.sha256(content(path, work)).hexdigest()[:16]
+            # A cohort's kept measures are called by a digest of their inputs' times.
+            found[str(path.relative_to(work).with_stem(code) if path.parent.name == "measures" else path.relative_to(work))] = code
+    if not arguments.keep:
+        shutil.rmtree(work)
     text = "".join(f"{code} {name}\n" for name, code in found.items())
     if arguments.output:
         arguments.output.write_text(text)

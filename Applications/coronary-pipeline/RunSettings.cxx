@@ -276,7 +276,7 @@ void RunOptions::DeclareVessels(Declaration& all)
     .ShowDefault();
   all
     .Add("--centerline-steps", "centerline_steps", settings.centerlineSteps, "N",
-      "After so many points on the ways back from possible tips the trees are written as far "
+      "After so many points on paths back from possible tips the trees are written as far "
       "as they are found: a limit of work, the same on any machine")
     .Check(WholeWithin(1, 2000000000))
     .ShowDefault();
