@@ -89,6 +89,25 @@ def regression(known, data, truth, share):
     return weights
 
 
+def fit_one(name, values, said, truth):
+    """Prints one sign's weight, the others held: their odds are those of the tables, which the program said with this weight at 0."""
+    said = np.clip(said, 1e-6, 1.0 - 1e-6)
+    others = np.log(said / (1.0 - said))
+    weight = 0.0
+    for _ in range(100):
+        chance = 1.0 / (1.0 + np.exp(-others - weight * values))
+        step = (values @ (truth - chance) - weight) / (values * values @ (chance * (1.0 - chance)) + 1.0)
+        weight += step
+        if abs(step) < 1e-8:
+            break
+    print(f"{name:20s} {weight:6.2f}")
+    for low in np.arange(0.0, 1.0, 0.1):
+        inside = (values > 0) & (chance >= low) & (chance < low + 0.1)
+        if inside.any():
+            print(f"said {low:.1f} to {low + 0.1:.1f}: {inside.sum()}, mean {chance[inside].mean():.2f}, "
+                  f"before {said[inside].mean():.2f}, true {truth[inside].mean():.2f}")
+
+
 def say(kind, weights, source, target):
     """Writes a table with what the weights say in its column of probabilities."""
     with open(source, newline="", encoding="utf-8") as file:
@@ -106,6 +125,7 @@ def main():
     parser.add_argument("kind", choices=sorted(BEFORE))
     parser.add_argument("tables", nargs="+", metavar="table")
     parser.add_argument("--wrong", action="store_true", help="list what is told wrongly")
+    parser.add_argument("--only", metavar="SIGN", help="fit the weight of one sign that has none yet; the others stay as they are")
     parser.add_argument("--say", nargs=2, action="append", default=[], metavar=("TABLE", "RESULT"),
                         help="a table that is not fitted to, and where it goes with what the weights say; may be repeated")
     arguments = parser.parse_args()
@@ -123,6 +143,11 @@ def main():
     what = {"links": "links", "tips": "vessels that go on", "branches": "veins", "placements": "in their places"}[arguments.kind]
     truth = (~artery if arguments.kind == "branches" else artery).astype(float)
     distance = np.array([float(row[-1]) if head[-1] == NO_SIGN else np.nan for row in rows])
+    if arguments.only:
+        if arguments.only not in names:
+            sys.exit(f"there is no sign '{arguments.only}'; there are {', '.join(names)}")
+        fit_one(arguments.only, signs[:, names.index(arguments.only)], np.array([float(row[4]) for row in rows]), truth)
+        return
     hearts = [row[0] + row[1] for row in rows]
     fold = {heart: n % FOLDS for n, heart in enumerate(dict.fromkeys(hearts))}
     folds = np.array([fold[heart] for heart in hearts])

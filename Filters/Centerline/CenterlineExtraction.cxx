@@ -19,6 +19,7 @@
 #include <iterator>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
@@ -58,7 +59,8 @@ public:
   CenterlineResult Run();
 
   /// What JudgeBranches says of the tree that Run made.
-  std::vector<VeinBranch> JudgeVeins() const;
+  /// @param before  left out of the trees before
+  std::vector<VeinBranch> JudgeVeins(const std::vector<RejectedVein>& before) const;
 
   /// mm, edge
   double Voxel() const { return this->Paths.voxel; }
@@ -606,14 +608,16 @@ bool Extractor::ThinBranchesFor(ThinBranchSettings& settings)
   return true;
 }
 
-std::vector<VeinBranch> Extractor::JudgeVeins() const
+std::vector<VeinBranch> Extractor::JudgeVeins(const std::vector<RejectedVein>& before) const
 {
   if (!this->Input.intensity || !this->Calibrated)
   {
     return {};
   }
   return JudgeBranches(this->Result.tree, *this->Paths.image, this->Paths.lumen.reference,
-    this->Blur, [this](const Vector3& point) { return this->Excluded.Contains(point); });
+    this->Blur, [this](const Vector3& point) { return this->Excluded.Contains(point); },
+    std::accumulate(before.begin(), before.end(), 0.0,
+      [](double sum, const RejectedVein& vein) { return sum + vein.probability; }));
 }
 
 /// What is too thin for the region, by the image alone.
@@ -1049,7 +1053,7 @@ CenterlineResult ExtractCenterlines(const CenterlineInput& input,
   {
     Extractor extractor(framed, input, excluded, settings, progress);
     result = extractor.Run();
-    const std::vector<VeinBranch> branches = extractor.JudgeVeins();
+    const std::vector<VeinBranch> branches = extractor.JudgeVeins(veins);
     judged.insert(judged.end(), branches.begin(), branches.end());
     std::vector<VeinBranch> found;
     std::copy_if(branches.begin(), branches.end(), std::back_inserter(found),

@@ -64,6 +64,7 @@ constexpr std::array<FittedSign, NumberOfVeinSigns> Signs{ {
   { "through", 1.20 },
   { "short", 2.43 },
   { "no_brightness", -0.04 },
+  { "others", 0.0 },
 } };
 
 /// Robust standard deviation of values around their middle.
@@ -93,11 +94,13 @@ class VeinFinder
 {
 public:
   VeinFinder(const VesselTree& tree, const ImageInterpolator& image,
-    const LumenReference& reference, double blur, const std::function<bool(const Vector3&)>& closed)
+    const LumenReference& reference, double blur, const std::function<bool(const Vector3&)>& closed,
+    double veins)
     : Tree(tree)
     , Links(tree)
     , Image(image)
     , Closed(closed)
+    , Veins(veins)
     , Blur(blur)
     , Contrast(reference.lumen - reference.background)
   {
@@ -192,6 +195,7 @@ private:
   const TreeLinks Links;
   const ImageInterpolator& Image;
   const std::function<bool(const Vector3&)>& Closed;
+  double Veins; ///< left out before
   double Blur;
   double Contrast;
   double UsualTip = 0.0; ///< logarithm of the radius
@@ -547,6 +551,7 @@ void VeinFinder::Weigh(Arm& arm) const
     std::clamp(arm.through, 0.0, 6.0),
     std::max(0.0, 20.0 - arm.path.back().passed) / 20.0,
     known ? 0.0 : 1.0,
+    std::min(1.0, this->Veins),
   };
   arm.branch.probability =
     ProbabilityOf(arm.doubt + FittedOdds(Intercept, Signs, arm.branch.signs));
@@ -912,9 +917,10 @@ const std::array<const char*, NumberOfVeinSigns>& VeinSignNames()
 }
 
 std::vector<VeinBranch> JudgeBranches(const VesselTree& tree, const ImageInterpolator& image,
-  const LumenReference& reference, double blur, const std::function<bool(const Vector3&)>& closed)
+  const LumenReference& reference, double blur, const std::function<bool(const Vector3&)>& closed,
+  double veins)
 {
-  return VeinFinder(tree, image, reference, blur, closed).Run();
+  return VeinFinder(tree, image, reference, blur, closed, veins).Run();
 }
 
 std::vector<double> VeinProbabilityOfPoints(

@@ -275,7 +275,7 @@ std::string OddsRow(double artery, bool used, double probability, const Vector3&
   const std::array<double, N>& signs)
 {
   std::array<char, 80> text;
-  std::snprintf(text.data(), text.size(), "%.3f,%d,%.4f,%.1f,%.1f,%.1f", artery, used ? 1 : 0,
+  std::snprintf(text.data(), text.size(), "%.3f,%d,%.6f,%.1f,%.1f,%.1f", artery, used ? 1 : 0,
     probability, place[0], place[1], place[2]);
   std::string row = text.data();
   for (const double sign : signs)
