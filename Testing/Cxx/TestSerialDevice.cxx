@@ -482,7 +482,7 @@ TEST(Emulator, AsAProgram)
   std::filesystem::create_directories(folder);
   const std::filesystem::path link = folder / "device";
   std::ofstream(folder / "scenario.json") << R"({"format":"dynamiccoronary script","version":1,
-    "pieces":[{"seconds":1.0},{"seconds":4.0,"wire_mm":10}],
+    "pieces":[{"seconds":1.0},{"seconds":4.0,"wire_mm":40}],
     "device":{"faults":[{"at":6.0,"kind":"close","ms":300}]}})";
   EmulatorProcess emulator({ "--quiet", "--scenario", (folder / "scenario.json").string(), "--link",
     link.string(), "--log", (folder / "log").string() });
@@ -495,7 +495,7 @@ TEST(Emulator, AsAProgram)
     EXPECT_TRUE(loop.Reaches(DeviceState::Disconnected, 8.0));
     const double reached = loop.input.drive.wirePosition;
     EXPECT_GT(reached, 5.0);
-    EXPECT_LT(reached, 10.01);
+    EXPECT_LT(reached, 40.01);
     EXPECT_TRUE(loop.Reaches(DeviceState::Running, 8.0));
     EXPECT_NEAR(loop.input.drive.wirePosition, reached, 0.01);
   }
