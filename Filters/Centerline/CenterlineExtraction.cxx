@@ -614,8 +614,9 @@ std::vector<VeinBranch> Extractor::JudgeVeins(const std::vector<RejectedVein>& b
   {
     return {};
   }
-  return JudgeBranches(this->Result.tree, *this->Paths.image, this->Paths.lumen.reference,
-    this->Blur, [this](const Vector3& point) { return this->Excluded.Contains(point); },
+  return JudgeBranches(
+    this->Result.tree, *this->Paths.image, this->Paths.lumen.reference, this->Blur,
+    [this](const Vector3& point) { return this->Excluded.Contains(point); },
     std::accumulate(before.begin(), before.end(), 0.0,
       [](double sum, const RejectedVein& vein) { return sum + vein.probability; }));
 }

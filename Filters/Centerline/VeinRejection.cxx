@@ -64,7 +64,7 @@ constexpr std::array<FittedSign, NumberOfVeinSigns> Signs{ {
   { "through", 1.20 },
   { "short", 2.43 },
   { "no_brightness", -0.04 },
-  { "others", 0.0 },
+  { "others", 0.86 },
 } };
 
 /// Robust standard deviation of values around their middle.

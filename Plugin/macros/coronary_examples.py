@@ -124,7 +124,7 @@ def posing(size=None):
     wall = simple.Show(made["wall"], front, "GeometryRepresentation")
     views.colour_by(wall, front, "Displacement", "displacement by the pose (mm)", 0.0, 11.0)
     wall.Opacity = 0.7  # the handle is inside
-    views.look_from_the_front(front, box, 1.5)
+    views.look_from_the_front(front, box, 1.2)
     views.note(front, "Drag the handle of the joint, Apply; grey: before", "What is shown")
     return finish(made, layout, (front,), pose)
 
@@ -169,7 +169,7 @@ def cfd_export(size=None):
     inside, _ = views.split(layout, 0, 0.5)
     wall = simple.Show(made["wall"], front, "GeometryRepresentation")
     views.colour_by(wall, front, "Displacement", "displacement from rest (mm)", 0.0, 20.0)
-    views.look_from_the_front(front, box, 1.3)
+    views.look_from_the_front(front, box, 1.1)
     posed = simple.ReferencePhase(poses, Automatic=0, Time=moment)
     fork = widest_fork(views.fetched(posed))
     simple.Delete(posed)
@@ -182,7 +182,7 @@ def cfd_export(size=None):
     shown.SetRepresentationType("Surface With Edges")
     views.colour_by(shown, inside, "MinimumDihedralAngle", "least dihedral angle at rest (rad)", 0.0, 1.23,
                     "Viridis (matplotlib)", "CELLS")
-    views.look_from_the_front(inside, [side for place in fork for side in (place - 11.0, place + 11.0)])
+    views.look_from_the_front(inside, [side for place in fork for side in (place - 13.0, place + 13.0)])
     views.note_phase((front, inside), source)
     views.note(front, "File > Save Data: mesh sequence", "What to do")
     return finish(made, layout, (front, inside), moved)
