@@ -447,7 +447,7 @@ check_options() {
   run 0 --help
   for command in phantom phantom-motion scan inspect; do
     run 0 "$command" --help
-    expect_text stdout "Usage: coronary-pipeline $command"
+    expect_text stdout "coronary-pipeline $command [OPTIONS]"
   done
   run 2
   expect_one_line coronary-pipeline command
