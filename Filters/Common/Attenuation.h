@@ -18,6 +18,7 @@ enum class XRayMaterial
   Water,
   ContrastMedium, ///< 350 mg of iodine a mL
   StainlessSteel, ///< AISI 304
+  CobaltChromium, ///< L605
   Nitinol,        ///< Ni 55.8, Ti 44.2 % of mass
   Platinum,
   Tungsten,
@@ -32,11 +33,11 @@ enum class XRayMaterial
   BariumPolymer ///< polyamide 12 with 40 % of its mass of barium sulphate
 };
 
-constexpr std::array<XRayMaterial, 15> AllXRayMaterials{ XRayMaterial::Water,
-  XRayMaterial::ContrastMedium, XRayMaterial::StainlessSteel, XRayMaterial::Nitinol,
-  XRayMaterial::Platinum, XRayMaterial::Tungsten, XRayMaterial::Gold, XRayMaterial::CorticalBone,
-  XRayMaterial::SoftTissue, XRayMaterial::Lung, XRayMaterial::Adipose, XRayMaterial::Blood,
-  XRayMaterial::Ptfe, XRayMaterial::Nylon, XRayMaterial::BariumPolymer };
+constexpr std::array<XRayMaterial, 16> AllXRayMaterials{ XRayMaterial::Water,
+  XRayMaterial::ContrastMedium, XRayMaterial::StainlessSteel, XRayMaterial::CobaltChromium,
+  XRayMaterial::Nitinol, XRayMaterial::Platinum, XRayMaterial::Tungsten, XRayMaterial::Gold,
+  XRayMaterial::CorticalBone, XRayMaterial::SoftTissue, XRayMaterial::Lung, XRayMaterial::Adipose,
+  XRayMaterial::Blood, XRayMaterial::Ptfe, XRayMaterial::Nylon, XRayMaterial::BariumPolymer };
 
 /// What a material is made of.
 struct XRayMaterialData

@@ -62,11 +62,11 @@ Json MetricsToJson(const SessionMetrics& metrics, const WallTopology& topology)
   for (const ProcedureEvent& event : metrics.events)
   {
     const auto n = static_cast<std::size_t>(event.branch);
-    const bool stretched = event.kind == ProcedureEvent::Kind::OverExpansion;
-    events.push_back({ { "seconds", event.seconds },
-      { "what", stretched ? "over_expansion" : "over_rated_pressure" },
+    const char* quantity = "";
+    const char* what = NameOf(event.kind, quantity);
+    events.push_back({ { "seconds", event.seconds }, { "what", what },
       { "vessel", n < topology.groupName.size() ? topology.groupName[n] : "" },
-      { stretched ? "diameter_over_reference" : "atm", event.value } });
+      { "place_mm", event.place }, { quantity, event.value } });
   }
   return { { "procedure_s", metrics.procedureSeconds },
     { "fluoroscopy_s", metrics.fluoroscopySeconds }, { "cine_s", metrics.cineSeconds },
@@ -77,6 +77,20 @@ Json MetricsToJson(const SessionMetrics& metrics, const WallTopology& topology)
     { "forceful_tip_s", metrics.forcefulSeconds }, { "wire_travel_mm", metrics.wireTravel },
     { "wire_turning_rad", metrics.wireTurning }, { "deepest_mm", metrics.deepest },
     { "path", branches }, { "events", events } };
+}
+
+std::string VesselAt(const WallTopology& topology, std::int64_t point)
+{
+  std::size_t branch = 0;
+  for (std::int64_t left = point; branch + 1 < topology.axis.size(); ++branch)
+  {
+    left -= static_cast<std::int64_t>(topology.axis[branch].size());
+    if (left < 0)
+    {
+      break;
+    }
+  }
+  return branch < topology.groupName.size() ? topology.groupName[branch] : "";
 }
 
 Json LesionsToJson(const std::vector<LesionResult>& lesions)
@@ -91,6 +105,48 @@ Json LesionsToJson(const std::vector<LesionResult>& lesions)
       { "greatest_diameter_over_reference", one.stretch } });
   }
   return list;
+}
+
+Json StentsToJson(const std::vector<StentResult>& stents)
+{
+  Json list = Json::array();
+  for (const StentResult& one : stents)
+  {
+    Json json = { { "name", one.name }, { "vessel", one.vessel }, { "from_mm", one.from },
+      { "to_mm", one.to }, { "beyond_vessel_mm", one.beyond } };
+    if (const StentRingResult* narrowest = one.Narrowest())
+    {
+      json["least_diameter_mm"] = narrowest->diameter;
+      json["least_area_mm2"] = 0.25 * M_PI * narrowest->diameter * narrowest->diameter;
+      json["expansion_percent"] = 100.0 * one.LeastExpanded()->Expansion();
+      json["residual_stenosis_percent"] = 100.0 * one.residual;
+      json["greatest_gap_mm"] = one.GreatestGap()->gap;
+      json["malapposed_mm"] = one.malapposed;
+      json["disease_before_mm"] = one.missedBefore;
+      json["disease_behind_mm"] = one.missedBehind;
+      json["covers_no_lesion"] = one.missedAll;
+    }
+    list.push_back(json);
+  }
+  return list;
+}
+
+/// Along the stents, a line a ring.
+std::string StentTable(const std::vector<StentResult>& stents, const WallTopology& topology)
+{
+  std::string table = "stent,name,vessel,place_mm,diameter_mm,lumen_mm,reference_mm,gap_mm\n";
+  for (std::size_t n = 0; n < stents.size(); ++n)
+  {
+    for (const StentRingResult& ring : stents[n].rings)
+    {
+      char text[320];
+      std::snprintf(text, sizeof(text), "%zu,%s,%s,%.6g,%.6g,%.6g,%.6g,%.6g\n", n + 1,
+        stents[n].name.c_str(), VesselAt(topology, ring.point).c_str(), ring.place, ring.diameter,
+        ring.lumen, ring.reference, ring.gap);
+      table += text;
+    }
+  }
+  return table;
 }
 
 /// Everything that goes into the folder.
@@ -174,8 +230,12 @@ public:
   /// For files that others write.
   std::string Place(const std::string& name) { return this->Folder->Add(name); }
 
-  void Finish(const Json& statistics, const SessionPictures& pictures)
+  void Finish(const Json& statistics, const SessionPictures& pictures, const std::string& stents)
   {
+    if (!stents.empty())
+    {
+      WriteFileAtomically(this->Folder->Add("stents.csv"), stents);
+    }
     if (pictures.Frames() > 0)
     {
       WriteFileAtomically(this->Folder->Add("frames.csv"), pictures.FrameTable());
@@ -228,7 +288,7 @@ private:
       const std::string name = entry.path().filename().string();
       if (IsNumbered(name, "wire_", ".vtp") || IsNumbered(name, "wall_", ".vtp") ||
         IsNumbered(name, "xray_", ".png") || IsNumbered(name, "scene_", ".png") ||
-        name == "wall.pvd" || name == "frames.csv" || name == "balloon.csv")
+        name == "wall.pvd" || name == "frames.csv" || name == "balloon.csv" || name == "stents.csv")
       {
         older.push_back(name);
       }
@@ -417,7 +477,9 @@ public:
     this->Runner.FinishRecording();
     if (this->Files)
     {
-      this->Files.Finish(this->Result(), this->Pictures);
+      const std::vector<StentResult> stents = this->Runner.Session().Stents();
+      this->Files.Finish(this->Result(), this->Pictures,
+        stents.empty() ? std::string() : StentTable(stents, this->World.wall->Topology()));
     }
   }
 
@@ -457,6 +519,17 @@ public:
       std::printf("lesion in %s: %.0f %% of %.2f mm, was %.0f %%; FFR %.2f, was %.2f\n",
         one.vessel.c_str(), 100.0 * one.degree, one.reference, 100.0 * one.degreeBefore,
         one.reserve, one.reserveBefore);
+    }
+    for (const StentResult& one : this->Runner.Session().Stents())
+    {
+      if (const StentRingResult* narrowest = one.Narrowest())
+      {
+        std::printf(
+          "stent in %s: %.1f mm long, least diameter %.2f mm, expansion %.0f %%, residual "
+          "stenosis %.0f %%, greatest gap %.2f mm\n",
+          one.vessel.c_str(), one.to - one.from, narrowest->diameter,
+          100.0 * one.LeastExpanded()->Expansion(), 100.0 * one.residual, one.GreatestGap()->gap);
+      }
     }
     if (this->Replay)
     {
@@ -523,6 +596,10 @@ private:
         !lesions.empty())
     {
       result["lesions"] = LesionsToJson(lesions);
+    }
+    if (scenario.balloon)
+    {
+      result["stents"] = StentsToJson(this->Runner.Session().Stents());
     }
     result["state_hash_interval"] = RecordedHashInterval;
     result["state_hashes"] = this->Hashes;
@@ -626,6 +703,8 @@ Json NameOfEvent(std::uint8_t kind)
       return "frame_rate_hz";
     case RecordedEvent::FieldOfView:
       return "field_of_view_mm";
+    case RecordedEvent::Exchange:
+      return "balloon_number";
     default:
       return static_cast<int>(kind);
   }
@@ -712,9 +791,9 @@ void ListInstruments()
   }
   for (const CatalogueBalloon& one : BuiltInCatalogue().balloons)
   {
-    std::printf("balloon   %-22s %4.2f mm at %g atm  %s\n", one.balloon.name.c_str(),
-      2.0 * one.balloon.FreeRadius(one.balloon.nominalPressure), one.balloon.nominalPressure,
-      one.description.c_str());
+    std::printf("%s %-22s %4.2f mm at %g atm  %s\n", one.balloon.stent ? "stent    " : "balloon  ",
+      one.balloon.name.c_str(), 2.0 * one.balloon.FreeRadius(one.balloon.nominalPressure),
+      one.balloon.nominalPressure, one.description.c_str());
   }
 }
 }

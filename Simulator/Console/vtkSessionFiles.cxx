@@ -90,6 +90,15 @@ void WriteInstruments(const std::string& path, const Intervention& intervention,
   AddLine(
     balloon, 2, [&](double) { return radii[next++]; }, points, lines, radius, abscissa,
     instruments);
+  std::vector<StentShape> stents;
+  intervention.StentShapes(stents);
+  for (const StentShape& stent : stents)
+  {
+    std::size_t place = 0;
+    AddLine(
+      stent.line, 3, [&](double) { return stent.radii[place++]; }, points, lines, radius, abscissa,
+      instruments);
+  }
   data->SetPoints(points);
   data->SetLines(lines);
   data->GetPointData()->AddArray(radius);

@@ -18,8 +18,9 @@ class vtkPolyData;
 namespace coronary
 {
 /**
- * Wire, catheter and, where there is one out of it, balloon catheter as polylines from their tips. Point data: MaximumInscribedSphereRadius
- * (that of the instrument, mm), Abscissas (mm from its tip). Cell data: Instrument (0 wire, 1 catheter, 2 balloon). Field data:
+ * Wire, catheter and, where there is one out of it, balloon catheter as polylines from their tips, stents from their ends near the
+ * ostium. Point data: MaximumInscribedSphereRadius (that of the instrument, inside of a stent, mm), Abscissas (mm from the line's
+ * beginning). Cell data: Instrument (0 wire, 1 catheter, 2 balloon, 3 stent). Field data:
  * Tick, PhaseTime, Inserted, and the forces of TickReport.
  * @throws std::runtime_error naming the file
  */

@@ -18,6 +18,7 @@
 #include "vtkTubeFilter.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace coronary
@@ -26,6 +27,10 @@ namespace
 {
 constexpr double RestPhase = 0.75;
 constexpr double WireThickness = 1.4; // of the true radius: to be seen
+constexpr double StrutRadius = 0.06;  // mm, likewise
+constexpr double RingSpacing = 1.5;   // mm along a stent
+constexpr int Crowns = 8;             // of a ring
+constexpr int Links = 2;              // between two rings
 
 void SetPoints(vtkPolyData* data, const std::vector<Vector3>& positions)
 {
@@ -74,6 +79,17 @@ void SetTriangles(vtkPolyData* data, const std::vector<Triangle>& triangles)
     cells->InsertNextCell(3, ids);
   }
   data->SetPolys(cells);
+}
+
+/// mm from the first point.
+std::vector<double> AlongLine(const std::vector<Vector3>& line)
+{
+  std::vector<double> along(line.size(), 0.0);
+  for (std::size_t n = 1; n < line.size(); ++n)
+  {
+    along[n] = along[n - 1] + (line[n] - line[n - 1]).norm();
+  }
+  return along;
 }
 
 void Draw(vtkRenderer* renderer, vtkActor* actor, vtkPolyDataMapper* mapper)
@@ -255,6 +271,10 @@ void vtkSimulatorScene::MakeInstruments(const Scenario& scenario)
   this->BalloonTube->SetVaryRadiusToVaryRadiusByAbsoluteScalar();
   this->BalloonActor->GetProperty()->SetColor(0.55, 0.75, 0.95);
   this->BalloonActor->GetProperty()->SetAmbient(0.4);
+  make(this->StentLines, this->StentTube, this->StentActor, StrutRadius, 4);
+  this->StentTube->CappingOff();
+  this->StentActor->GetProperty()->SetColor(0.92, 0.94, 0.97);
+  this->StentActor->GetProperty()->SetAmbient(0.5);
 }
 
 void vtkSimulatorScene::MakeTracers()
@@ -267,6 +287,61 @@ void vtkSimulatorScene::MakeTracers()
   look->SetColor(1.0, 0.95, 0.55);
   look->SetPointSize(2.0F);
   look->LightingOff();
+}
+
+/// Rings of zigzags with links between them; a stent of no maker.
+void vtkSimulatorScene::SetStents(const std::vector<StentShape>& stents)
+{
+  vtkNew<vtkPoints> points;
+  vtkNew<vtkCellArray> lines;
+  for (const StentShape& stent : stents)
+  {
+    if (stent.line.size() < 2)
+    {
+      continue;
+    }
+    const std::vector<double> along = AlongLine(stent.line);
+    const auto rings = static_cast<int>(std::max(2.0, std::round(along.back() / RingSpacing)));
+    const double height = 0.7 * along.back() / rings; // of a crown
+    Vector3 side = (stent.line[1] - stent.line[0]).unitOrthogonal();
+    std::vector<vtkIdType> valleys;
+    for (int ring = 0; ring < rings; ++ring)
+    {
+      const double middle = along.back() * (ring + 0.5) / rings;
+      std::vector<vtkIdType> crowns;
+      for (int k = 0; k < 2 * Crowns; ++k)
+      {
+        const double at =
+          std::clamp(middle + (k % 2 == 0 ? -0.5 : 0.5) * height, 0.0, along.back());
+        const auto n = static_cast<std::size_t>(std::min<std::ptrdiff_t>(
+          std::max<std::ptrdiff_t>(
+            1, std::lower_bound(along.begin(), along.end(), at) - along.begin()),
+          static_cast<std::ptrdiff_t>(along.size()) - 1));
+        const double t = (at - along[n - 1]) / (along[n] - along[n - 1]);
+        const Vector3 tangent = (stent.line[n] - stent.line[n - 1]).normalized();
+        side = (side - side.dot(tangent) * tangent).normalized();
+        const double angle = M_PI * k / Crowns;
+        const Vector3 out = std::cos(angle) * side + std::sin(angle) * tangent.cross(side);
+        const double radius = stent.radii[n - 1] + t * (stent.radii[n] - stent.radii[n - 1]);
+        const Vector3 point = stent.line[n - 1] + t * (stent.line[n] - stent.line[n - 1]) +
+          (radius + 0.5 * stent.design.strut) * out;
+        crowns.push_back(points->InsertNextPoint(point.data()));
+      }
+      lines->InsertNextCell(2 * Crowns + 1);
+      for (int k = 0; k <= 2 * Crowns; ++k)
+      {
+        lines->InsertCellPoint(crowns[k % (2 * Crowns)]);
+      }
+      for (int link = 0; link < Links && !valleys.empty(); ++link)
+      {
+        const int k = 2 * Crowns * link / Links;
+        lines->InsertNextCell({ valleys[k + 1], crowns[k] });
+      }
+      valleys = crowns;
+    }
+  }
+  this->StentLines->SetPoints(points);
+  this->StentLines->SetLines(lines);
 }
 
 std::int64_t vtkSimulatorScene::NumberOfTriangles() const
@@ -297,6 +372,10 @@ void vtkSimulatorScene::Update(const SessionSnapshot& snapshot)
       radii->InsertNextValue(radius);
     }
     this->BalloonLine->GetPointData()->SetScalars(radii);
+  }
+  if (!snapshot.stents.empty() || this->StentLines->GetNumberOfPoints() > 0)
+  {
+    this->SetStents(snapshot.stents);
   }
   if (this->TracerActor->GetVisibility() != 0)
   {

@@ -74,6 +74,7 @@ private:
   void MakeHeart();
   void MakeInstruments(const Scenario& scenario);
   void MakeTracers();
+  void SetStents(const std::vector<StentShape>& stents);
 
   std::shared_ptr<const HeartShell> Heart;
   std::vector<std::int64_t> Drawn;
@@ -95,6 +96,9 @@ private:
   vtkNew<vtkPolyData> BalloonLine;
   vtkNew<vtkTubeFilter> BalloonTube;
   vtkNew<vtkActor> BalloonActor;
+  vtkNew<vtkPolyData> StentLines;
+  vtkNew<vtkTubeFilter> StentTube;
+  vtkNew<vtkActor> StentActor;
   vtkNew<vtkPolyData> TracerPoints;
   vtkNew<vtkActor> TracerActor;
 };

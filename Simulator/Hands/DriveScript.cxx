@@ -15,6 +15,7 @@ namespace
 constexpr std::size_t MostPieces = 100000;
 constexpr double LongestPiece = 36000.0; // s
 constexpr double MaximumHeartRate = 240.0;
+constexpr std::int64_t MostBalloons = 100;
 constexpr double FurthestOfOld = 1e6; // mm, degrees, mL
 
 std::uint32_t PedalsOf(JsonFields& fields)
@@ -63,6 +64,8 @@ DrivePiece PieceOf(JsonFields& member, PiecesOf form)
   piece.pedals = hasPedals ? PedalsOf(member) : 0U;
   piece.setsHeartRate = member.Has("heart_rate_bpm");
   piece.heartRate = member.Number("heart_rate_bpm", 0.0, MaximumHeartRate, 0.0);
+  piece.exchanges = member.Has("exchange");
+  piece.exchange = static_cast<double>(member.Whole("exchange", 0, MostBalloons, 0));
   member.Done();
   return piece;
 }
@@ -124,9 +127,10 @@ SessionInput DriveScript::At(double seconds, const SessionInput& start) const
   return input;
 }
 
-std::vector<double> DriveScript::HeartRates(double from, double to) const
+std::vector<double> DriveScript::Chosen(
+  double from, double to, bool DrivePiece::*chooses, double DrivePiece::*value) const
 {
-  std::vector<double> rates;
+  std::vector<double> chosen;
   const auto first = std::lower_bound(this->Starts.begin(), this->Starts.end(), from,
     [](const Start& start, double time) { return start.time < time; });
   for (auto n = static_cast<std::size_t>(first - this->Starts.begin()); n < this->Pieces.size();
@@ -136,12 +140,22 @@ std::vector<double> DriveScript::HeartRates(double from, double to) const
     {
       break;
     }
-    if (this->Pieces[n].setsHeartRate)
+    if (this->Pieces[n].*chooses)
     {
-      rates.push_back(this->Pieces[n].heartRate);
+      chosen.push_back(this->Pieces[n].*value);
     }
   }
-  return rates;
+  return chosen;
+}
+
+std::vector<double> DriveScript::HeartRates(double from, double to) const
+{
+  return this->Chosen(from, to, &DrivePiece::setsHeartRate, &DrivePiece::heartRate);
+}
+
+std::vector<double> DriveScript::Exchanges(double from, double to) const
+{
+  return this->Chosen(from, to, &DrivePiece::exchanges, &DrivePiece::exchange);
 }
 
 DriveScript DriveScriptOf(JsonFields& fields, PiecesOf form)

@@ -24,6 +24,8 @@ struct DrivePiece
   std::uint32_t pedals = 0;   ///< bits of Pedal; until they are set again
   bool setsHeartRate = false; ///< when the piece begins
   double heartRate = 0.0;     ///< beats a minute
+  bool exchanges = false;     ///< when the piece begins
+  double exchange = 0.0;      ///< number of the balloon that is taken
 };
 
 class DriveScript
@@ -42,8 +44,13 @@ public:
 
   /// Heart rates that are set at or after `from` and before `to`, s.
   std::vector<double> HeartRates(double from, double to) const;
+  /// Likewise numbers of the balloons that are taken.
+  std::vector<double> Exchanges(double from, double to) const;
 
 private:
+  std::vector<double> Chosen(
+    double from, double to, bool DrivePiece::*chooses, double DrivePiece::*value) const;
+
   struct Start
   {
     double time = 0.0;

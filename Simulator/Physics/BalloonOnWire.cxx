@@ -2,6 +2,7 @@
 
 #include "Fnv1a.h"
 #include "Numbers.h"
+#include "RisingRoot.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,42 +20,6 @@ constexpr double Slack = 0.05;      // mm, likewise of what is folded: it holds 
 constexpr double MostCarried = 2.0; // mm in a key frame, by the wall that holds it
 constexpr double MegapascalPerAtm = 0.101325;
 constexpr double HighestPressure = 60.0; // atm
-
-/// The root of a rising function between two values (Illinois).
-template <typename Function>
-double RisingRoot(const Function& function, double low, double high, double tolerance)
-{
-  double atLow = function(low);
-  double atHigh = function(high);
-  if (atLow >= 0.0 || atHigh <= 0.0)
-  {
-    return atLow >= 0.0 ? low : high;
-  }
-  for (int k = 0, side = 0; k < 60 && high - low > tolerance; ++k)
-  {
-    const double middle = (low * atHigh - high * atLow) / (atHigh - atLow);
-    const double value = function(middle);
-    if (value == 0.0)
-    {
-      return middle;
-    }
-    if (value > 0.0)
-    {
-      high = middle;
-      atHigh = value;
-      atLow *= side > 0 ? 0.5 : 1.0;
-      side = 1;
-    }
-    else
-    {
-      low = middle;
-      atLow = value;
-      atHigh *= side < 0 ? 0.5 : 1.0;
-      side = -1;
-    }
-  }
-  return 0.5 * (low + high);
-}
 }
 
 RodJoint SleevedJoint(const RodJoint& wire, double stiffness)
@@ -70,19 +35,38 @@ RodJoint SleevedJoint(const RodJoint& wire, double stiffness)
 
 BalloonOnWire::BalloonOnWire(
   const BalloonCatheter& balloon, const GuideCatheter& guide, double start)
-  : Balloon(balloon)
+  : System(balloon)
+  , Balloon(balloon.WithoutStent())
   , Guide(guide)
   , Start(start)
   , Place(start)
   , HandPlace(start)
 {
+  this->Report_.crimped = balloon.stent.has_value();
   const auto count = static_cast<std::size_t>(std::ceil(balloon.Reach() / Spacing)) + 2;
   for (std::size_t n = 0; n < count; ++n)
   {
-    this->OuterNext.push_back(balloon.FoldedRadius(static_cast<double>(n) * Spacing));
+    this->OuterNext.push_back(this->FoldedAt(static_cast<double>(n) * Spacing));
   }
   this->OuterNow = this->OuterNext;
   this->Report_.least = this->Report_.greatest = 2.0 * balloon.crossingRadius;
+  if (balloon.stent)
+  {
+    // Where the first ring flows.
+    const StentRing ring = balloon.stent->CrimpedRing();
+    const double yields = ring.crimped + ring.opening / ring.stiffness;
+    this->Opens = ring.opening +
+      RisingRoot(
+        [&](double p) { return this->Balloon.FreeRadius(p) - yields; }, 0.0, HighestPressure, 1e-9);
+    this->Report_.least = this->Report_.greatest = 2.0 * balloon.stent->crimpedRadius;
+  }
+}
+
+/// The even part of its stent is around it.
+bool BalloonOnWire::Crimped(double behind) const
+{
+  return this->Report_.crimped &&
+    std::abs(behind - this->Balloon.Middle()) <= 0.5 * this->System.stent->CrimpedLength();
 }
 
 double BalloonOnWire::RadiusAt(double behind) const
@@ -102,7 +86,7 @@ double BalloonOnWire::RadiusAt(double behind) const
 bool BalloonOnWire::Opened(double behind) const
 {
   constexpr double Some = 0.02; // mm
-  return this->Covers(behind) && this->RadiusAt(behind) > this->Balloon.FoldedRadius(behind) + Some;
+  return this->Covers(behind) && this->RadiusAt(behind) > this->FoldedAt(behind) + Some;
 }
 
 bool BalloonOnWire::Drive(double way, double most, const Rail& rail, double share, CosseratRod& rod)
@@ -154,7 +138,7 @@ bool BalloonOnWire::Drive(double way, double most, const Rail& rail, double shar
     const bool here = this->Covers(behind);
     const double bare = (*rail.segments)[i].radius;
     const double blend = std::min(1.0, behind / TipBlend);
-    const double folded = this->Balloon.FoldedRadius(behind);
+    const double folded = this->FoldedAt(behind);
     const double outside =
       folded - Slack + FeltOpening * std::max(0.0, this->RadiusAt(behind) - folded);
     rod.SetRadius(i, here ? bare + blend * std::max(0.0, outside - bare) : bare);
@@ -189,8 +173,9 @@ void BalloonOnWire::Feel(const CosseratRod& rod, const Rail& rail)
 
 double BalloonOnWire::BalloonRadius(const Section& section, double pressure) const
 {
-  return section.folded +
-    section.shape * (this->Balloon.FreeRadius(pressure) - this->Balloon.crossingRadius);
+  return section.crimped ? section.folded
+                         : section.folded +
+      section.shape * (this->Balloon.FreeRadius(pressure) - this->Balloon.crossingRadius);
 }
 
 void BalloonOnWire::Balance(Section& section, double pressure, const DilatableWall& wall) const
@@ -202,9 +187,7 @@ void BalloonOnWire::Balance(Section& section, double pressure, const DilatableWa
     section.radius = section.rest;
     return;
   }
-  const WallStation& station = wall.Stations()[section.point];
-  const auto pressed = [&](double radius)
-  { return std::max(0.0, WallPressure(station, radius, wall.Settings())); };
+  const auto pressed = [&](double radius) { return wall.Resistance(section.point, radius); };
   // What is folded is rigid: where it does not fit, it opens the wall.
   const double least = std::max(section.rest, section.folded);
   section.radius = least;
@@ -232,6 +215,29 @@ double BalloonOnWire::FillAt(double pressure, const DilatableWall& wall)
   return volume;
 }
 
+/// What is around it is the wall's from now on.
+void BalloonOnWire::LeaveStent(const VesselWay& way, DilatableWall& wall)
+{
+  PlacedStent placed;
+  placed.name = this->System.name;
+  placed.design = *this->System.stent;
+  placed.middle = this->HeldPlace;
+  const double half = 0.5 * placed.design.length;
+  for (std::size_t n = 0; n < way.points.size(); ++n)
+  {
+    if (std::abs(way.place[n] - placed.middle) <= half)
+    {
+      placed.points.push_back(way.points[n]);
+      placed.places.push_back(way.place[n]);
+      wall.Place(way.points[n], placed.design.CrimpedRing());
+      placed.rings.push_back(wall.Rings(way.points[n]).size() - 1);
+    }
+  }
+  placed.beyond = std::max(0.0, placed.middle + half - way.place.back());
+  this->Placed = std::move(placed);
+  this->Report_.crimped = false;
+}
+
 void BalloonOnWire::Inflate(double seconds, double pressure, double place, double catheterTip,
   const VesselWay& way, DilatableWall& wall)
 {
@@ -242,15 +248,28 @@ void BalloonOnWire::Inflate(double seconds, double pressure, double place, doubl
   this->Slid = 0.0;
   this->Share = 0.0;
   const double tip = this->HeldPlace + this->Balloon.Middle(); // along the way
+  const bool inGuide = this->Report_.crimped &&
+    this->HeldPlace - 0.5 * this->System.stent->CrimpedLength() < catheterTip;
+  this->Report_.caught = inGuide && pressure > 0.0;
+  if (this->Report_.caught)
+  {
+    pressure = 0.0;
+  }
+  if (this->Report_.crimped && !inGuide && this->Pressure >= this->Opens)
+  {
+    this->LeaveStent(way, wall);
+  }
   const auto add = [&](std::int64_t point, double at, double length)
   {
     Section section;
     section.point = point;
     section.behind = tip - at;
+    section.place = at;
     section.length = length;
-    section.folded = this->Balloon.FoldedRadius(section.behind);
+    section.folded = this->FoldedAt(section.behind);
+    section.crimped = this->Crimped(section.behind);
     section.shape = this->Balloon.Shape(section.behind);
-    section.rest = point < 0 ? this->Guide.innerRadius : wall.Radii()[point];
+    section.rest = point < 0 ? this->Guide.innerRadius : wall.InsideRadius(point);
     section.radius = section.rest;
     section.balloon = section.folded;
     this->Loaded.push_back(section);
@@ -279,11 +298,19 @@ void BalloonOnWire::Inflate(double seconds, double pressure, double place, doubl
       -1.0, HighestPressure, 1e-9);
   this->Filled = this->FillAt(this->Pressure, wall);
 
+  this->Summarize(wall);
+  this->Outline();
+}
+
+/// The frame's report; what it holds, it holds from now on.
+void BalloonOnWire::Summarize(DilatableWall& wall)
+{
   BalloonReport& report = this->Report_;
   report.pressure = this->Pressure;
-  report.grip = report.wallPressure = report.stretch = report.greatest = 0.0;
+  report.middle = this->HeldPlace;
+  report.grip = report.wallPressure = report.stretch = report.greatest = report.ringStretch = 0.0;
   report.least = 1e9;
-  report.place = -1;
+  report.place = report.stretched = report.ringPoint = -1;
   this->Inside.clear();
   double nearest = 1e9;
   for (const Section& section : this->Loaded)
@@ -308,12 +335,39 @@ void BalloonOnWire::Inflate(double seconds, double pressure, double place, doubl
       wall.Hold(section.point, section.radius);
       report.grip += this->Balloon.friction * MegapascalPerAtm * section.pressed * 2.0 * Pi *
         section.radius * section.length;
-      report.wallPressure = std::max(report.wallPressure, section.pressed);
-      report.stretch =
-        std::max(report.stretch, section.radius / wall.Stations()[section.point].reference);
+      this->SummarizeWall(section, wall);
     }
   }
-  this->Outline();
+}
+
+void BalloonOnWire::SummarizeWall(const Section& section, const DilatableWall& wall)
+{
+  BalloonReport& report = this->Report_;
+  const WallStation& station = wall.Stations()[section.point];
+  const double lumen = wall.Radii()[section.point];
+  const std::vector<StentRing>& rings = wall.Rings(section.point);
+  for (const StentRing& ring : rings)
+  {
+    if (ring.radius / ring.greatest > report.ringStretch)
+    {
+      report.ringStretch = ring.radius / ring.greatest;
+      report.ringPoint = section.point;
+      report.ringPlace = section.place;
+    }
+  }
+  if (wall.Gap(section.point) > 0.0)
+  {
+    return; // it holds a ring that does not reach the wall
+  }
+  this->Inside.back().second = lumen; // struts or not, nothing flows past
+  report.wallPressure = std::max(report.wallPressure,
+    rings.empty() ? section.pressed : WallPressure(station, lumen, wall.Settings()));
+  if (lumen / station.reference > report.stretch)
+  {
+    report.stretch = lumen / station.reference;
+    report.stretched = section.point;
+    report.stretchedPlace = section.place;
+  }
 }
 
 /// What the rod's contacts see of it at the frame's end.
@@ -324,7 +378,8 @@ void BalloonOnWire::Outline()
   {
     const double behind = static_cast<double>(n) * Spacing;
     Section section;
-    section.folded = this->Balloon.FoldedRadius(behind);
+    section.folded = this->FoldedAt(behind);
+    section.crimped = this->Crimped(behind);
     section.shape = this->Balloon.Shape(behind);
     double radius = std::min(this->BalloonRadius(section, this->Pressure), this->Guide.innerRadius);
     // Sections are ordered from the guide's to those ahead, but for the first ones.

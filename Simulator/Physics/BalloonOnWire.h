@@ -1,6 +1,7 @@
 /**
  * @file BalloonOnWire.h
- * @brief A balloon catheter as a sleeve on the simulated wire, and its balloon against the vessel's wall.
+ * @brief A balloon catheter as a sleeve on the simulated wire, its balloon against the vessel's wall, and the stent that it
+ * leaves there.
  */
 #ifndef DynamicCoronary_BalloonOnWire_h
 #define DynamicCoronary_BalloonOnWire_h
@@ -10,6 +11,9 @@
 #include "Instrument.h"
 
 #include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 namespace coronary
@@ -26,7 +30,28 @@ struct BalloonReport
   double wallPressure = 0.0; ///< atm on the wall, greatest
   double stretch =
     0.0; ///< greatest diameter of the wall that it holds, over the reference; 0: it holds none
-  std::int64_t place = -1; ///< point of the axes at the balloon's middle; -1: in the guide
+  std::int64_t place = -1;     ///< point of the axes at the balloon's middle; -1: in the guide
+  double middle = 0.0;         ///< mm from the ostium, of that
+  std::int64_t stretched = -1; ///< point of the axes where `stretch` is
+  double stretchedPlace = 0.0; ///< mm from the ostium, likewise
+  double ringStretch =
+    0.0; ///< greatest diameter of a stent's ring that it holds, over its design's greatest
+  std::int64_t ringPoint = -1; ///< where that is
+  double ringPlace = 0.0;      ///< mm from the ostium, likewise
+  bool crimped = false;        ///< its stent is on it
+  bool caught = false; ///< it is to be inflated, but its stent is still in the guide: it is not
+};
+
+/// A stent that is left in the wall: rings at the points of the axes, which move with the vessel.
+struct PlacedStent
+{
+  std::string name; ///< of its balloon
+  StentDesign design;
+  double middle = 0.0;              ///< mm from the ostium
+  std::vector<std::int64_t> points; ///< of the axes, from the ostium on
+  std::vector<double> places;       ///< mm from the ostium, of these
+  std::vector<std::size_t> rings;   ///< which of DilatableWall::Rings there
+  double beyond = 0.0;              ///< mm of it that have no vessel around
 };
 
 /// A joint of a wire within a straight sleeve: stiffnesses add, and what is curved at rest is straightened.
@@ -40,8 +65,11 @@ RodJoint SleevedJoint(const RodJoint& wire, double stiffness);
  * What resists its way is Coulomb friction: on the wire, of contacts with wall and guide, and of the wall that it holds open.
  * The hand is on a spring (the shaft), so an inflated balloon sticks until the spring pulls it off.
  *
- * Balloon and wall are at balance in each section of the axis: free radius at (p - p_wall(R)) = R. The balloon fills through a
- * resistance: dV/dt = (p_hand - p) / R, V that of all sections.
+ * Balloon, stent and wall are at balance in each section of the axis: free radius at (p - p_stent(R) - p_wall(R + strut)) = R.
+ * The balloon fills through a resistance: dV/dt = (p_hand - p) / R, V that of all sections.
+ *
+ * A stent goes with its balloon until the pressure opens it; from then on its rings belong to the wall where it is. Before all of
+ * it is out of the guide, the balloon takes no pressure.
  */
 class BalloonOnWire
 {
@@ -76,7 +104,12 @@ public:
   void Inflate(double seconds, double pressure, double place, double catheterTip,
     const VesselWay& way, DilatableWall& wall);
 
+  /// The balloon; its table is that without a stent.
   const BalloonCatheter& Device() const { return this->Balloon; }
+  /// That it came with.
+  const std::optional<StentDesign>& Stent() const { return this->System.stent; }
+  /// The stent that was left in the wall since the last call.
+  std::optional<PlacedStent> TakePlaced() { return std::exchange(this->Placed, std::nullopt); }
   double Tip() const { return this->Place; } ///< u
   bool Covers(double behind) const { return behind >= 0.0 && behind <= this->Balloon.monorail; }
   const BalloonReport& Report() const { return this->Report_; }
@@ -96,21 +129,35 @@ private:
   {
     std::int64_t point = -1;
     double behind = 0.0; ///< mm behind the tip
+    double place = 0.0;  ///< mm from the ostium
     double length = 0.0; ///< mm of the axis
     double folded = 0.0; ///< mm
     double shape = 0.0;
     double rest = 0.0;    ///< mm: where nothing presses
-    double radius = 0.0;  ///< mm, of the wall
+    double radius = 0.0;  ///< mm, of what is around the balloon
     double balloon = 0.0; ///< mm
-    double pressed = 0.0; ///< atm on the wall
+    double pressed = 0.0; ///< atm on what is around it
+    bool crimped = false; ///< a stent holds it folded
   };
 
+  double FoldedAt(double behind) const
+  {
+    return this->Report_.crimped ? this->System.CrimpedRadius(behind)
+                                 : this->Balloon.FoldedRadius(behind);
+  }
+  bool Crimped(double behind) const;
+  void LeaveStent(const VesselWay& way, DilatableWall& wall);
   double FillAt(double pressure, const DilatableWall& wall);
   void Balance(Section& section, double pressure, const DilatableWall& wall) const;
   double BalloonRadius(const Section& section, double pressure) const;
+  void Summarize(DilatableWall& wall);
+  void SummarizeWall(const Section& section, const DilatableWall& wall);
   void Outline();
 
+  BalloonCatheter System; ///< with its stent
   BalloonCatheter Balloon;
+  double Opens = 0.0; ///< atm from which its stent does
+  std::optional<PlacedStent> Placed;
   GuideCatheter Guide;
   double Start = 0.0;
   double Place = 0.0;     ///< u of its tip

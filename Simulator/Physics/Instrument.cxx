@@ -10,6 +10,7 @@ namespace coronary
 namespace
 {
 constexpr std::size_t MostPieces = 1000;
+constexpr double StentEdge = 1.0; // mm on which a crimped stent's ends taper, for what touches them
 
 /// NaN is not within.
 void Require(double value, double low, double high, const std::string& whose,
@@ -115,6 +116,62 @@ void GuideCatheter::Validate() const
   }
 }
 
+namespace
+{
+void ValidateStent(const BalloonCatheter& balloon, const std::string& balloonName)
+{
+  const StentDesign& stent = *balloon.stent;
+  const std::string whose = balloonName + ", its stent";
+  Require(stent.strut, 0.01, 0.3, whose, "the strut's thickness", "mm");
+  Require(stent.crimpedRadius, balloon.crossingRadius + stent.strut - 1e-9, 1.5, whose,
+    "the crimped radius (balloon and struts fit into it)", "mm");
+  const double inside = 2.0 * (stent.crimpedRadius - stent.strut);
+  Require(stent.diameter, inside + 0.1, 10.0, whose, "the diameter", "mm");
+  Require(stent.greatestDiameter, stent.diameter, 12.0, whose, "the greatest diameter", "mm");
+  Require(stent.foreshortening, 0.0, 0.3, whose, "the foreshortening", "");
+  Require(stent.length, 4.0, balloon.length * (1.0 - stent.foreshortening), whose,
+    "the length (crimped it is no longer than its balloon)", "mm");
+  // A ring that springs back stays wider than it was crimped.
+  Require(stent.recoil, 0.001, std::min(0.3, 1.0 - (inside + 0.02) / stent.diameter), whose,
+    "the recoil", "");
+  Require(stent.collapsePressure, 0.05, 20.0, whose, "the collapse pressure", "atm");
+  Require(
+    stent.openingPressure, 0.01, stent.collapsePressure, whose, "the opening pressure", "atm");
+  Require(stent.metalShare, 0.01, 1.0, whose, "the metal's share", "");
+  double before = 0.0;
+  for (const ComplianceRow& row : balloon.WithoutStent().compliance)
+  {
+    if (!(row.pressure > before))
+    {
+      throw std::invalid_argument(whose + ": at " + std::to_string(row.diameter) +
+        " mm of the compliance table there is too little pressure to open it.");
+    }
+    before = row.pressure;
+  }
+}
+}
+
+double StentDesign::LengthAt(double insideDiameter) const
+{
+  const double crimped = 2.0 * (this->crimpedRadius - this->strut);
+  const double open = (insideDiameter - crimped) / (this->diameter - crimped);
+  return this->CrimpedLength() * (1.0 - this->foreshortening * open);
+}
+
+StentRing StentDesign::CrimpedRing() const
+{
+  StentRing ring;
+  ring.crimped = ring.natural = ring.widest = ring.radius = this->crimpedRadius - this->strut;
+  ring.thickness = this->strut;
+  const double springs = 0.5 * this->recoil * this->diameter;
+  ring.stiffness = this->collapsePressure / springs;
+  ring.opening = this->openingPressure;
+  ring.hardening = (this->collapsePressure - this->openingPressure) /
+    (0.5 * this->diameter - springs - ring.crimped);
+  ring.greatest = 0.5 * this->greatestDiameter;
+  return ring;
+}
+
 void BalloonCatheter::Validate() const
 {
   const std::string whose = "Balloon '" + this->name + "'";
@@ -149,6 +206,10 @@ void BalloonCatheter::Validate() const
     Require(row.diameter, before, 10.0, part, "the diameter", "mm");
     pressure = row.pressure;
     before = row.diameter;
+  }
+  if (this->stent)
+  {
+    ValidateStent(*this, whose);
   }
 }
 
@@ -188,6 +249,39 @@ double BalloonCatheter::FoldedRadius(double behind) const
     std::clamp((behind - this->tipLength - this->length) / this->shoulder, 0.0, 1.0);
   const double front = this->tipRadius + tip * (this->crossingRadius - this->tipRadius);
   return front + back * (this->shaftRadius - this->crossingRadius);
+}
+
+double BalloonCatheter::CrimpedRadius(double behind) const
+{
+  const double folded = this->FoldedRadius(behind);
+  if (!this->stent)
+  {
+    return folded;
+  }
+  const double within = 0.5 * this->stent->CrimpedLength() - std::abs(behind - this->Middle());
+  const double share = std::clamp(within / StentEdge, 0.0, 1.0);
+  return folded + share * std::max(0.0, this->stent->crimpedRadius - folded);
+}
+
+double BalloonCatheter::Profile() const
+{
+  const double folded = std::max(this->crossingRadius, this->shaftRadius);
+  return this->stent ? std::max(folded, this->stent->crimpedRadius) : folded;
+}
+
+BalloonCatheter BalloonCatheter::WithoutStent() const
+{
+  BalloonCatheter bare = *this;
+  bare.stent.reset();
+  if (this->stent)
+  {
+    const StentRing ring = this->stent->CrimpedRing();
+    for (ComplianceRow& row : bare.compliance)
+    {
+      row.pressure -= RingPressure(ring, 0.5 * row.diameter);
+    }
+  }
+  return bare;
 }
 
 double BalloonCatheter::BendingStiffness(double behind, double pressure, double radius) const

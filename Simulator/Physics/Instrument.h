@@ -1,11 +1,14 @@
 /**
  * @file Instrument.h
- * @brief Guidewires, guide catheters and balloon catheters as their mechanics.
+ * @brief Guidewires, guide catheters, balloon catheters and stents as their mechanics.
  */
 #ifndef DynamicCoronary_Instrument_h
 #define DynamicCoronary_Instrument_h
 
+#include "StentRing.h"
+
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -100,6 +103,26 @@ struct ComplianceRow
   double diameter = 0.0; ///< mm
 };
 
+/// A stent that a balloon opens. Diameters are inside.
+struct StentDesign
+{
+  double diameter = 0.0;      ///< mm, nominal
+  double length = 0.0;        ///< mm at that diameter
+  double crimpedRadius = 0.0; ///< mm, outside
+  double strut = 0.0;         ///< mm, thickness
+  double recoil = 0.0; ///< of the nominal diameter, when the balloon goes and nothing is around it
+  double foreshortening = 0.0;   ///< of the length, from crimped to nominal
+  double greatestDiameter = 0.0; ///< mm
+  double openingPressure = 0.0;  ///< atm that a crimped ring bears before it flows
+  double collapsePressure = 0.0; ///< atm likewise at nominal diameter, inwards and outwards
+  double metalShare = 0.0;       ///< of its surface that struts cover, at nominal diameter
+
+  double CrimpedLength() const { return this->length / (1.0 - this->foreshortening); }
+  double LengthAt(double insideDiameter) const; ///< mm
+  /// A ring that is crimped. stiffness: collapsePressure / (recoil diameter / 2).
+  StentRing CrimpedRing() const;
+};
+
 /// A balloon catheter that runs on the wire, from its tip: tip, balloon between two markers, shaft.
 struct BalloonCatheter
 {
@@ -115,7 +138,9 @@ struct BalloonCatheter
   double markerLength = 0.0;    ///< mm of its two marker bands, at the ends of the even part
   double nominalPressure = 0.0; ///< atm
   double ratedPressure = 0.0;   ///< atm
-  std::vector<ComplianceRow> compliance; ///< rising
+  std::vector<ComplianceRow>
+    compliance;                     ///< rising; of a delivery system with its stent, inside of that
+  std::optional<StentDesign> stent; ///< that it delivers
 
   double tipStiffness = 0.0;     ///< EI, N mm^2, before the balloon
   double balloonStiffness = 0.0; ///< EI, folded
@@ -135,8 +160,14 @@ struct BalloonCatheter
   double FreeRadius(double pressure) const;
   /// What of the balloon's opening there is, 0 to 1. @param behind  mm behind the tip
   double Shape(double behind) const;
-  /// mm, outside, folded; 0 before the tip.
+  /// mm, outside, folded, without its stent; 0 before the tip.
   double FoldedRadius(double behind) const;
+  /// mm, likewise with its stent.
+  double CrimpedRadius(double behind) const;
+  /// mm, greatest of all, with its stent.
+  double Profile() const;
+  /// The balloon without its stent: the pressures of its table are what is left of them.
+  BalloonCatheter WithoutStent() const;
   /// EI, N mm^2. @param pressure  atm @param radius  mm of the balloon there
   double BendingStiffness(double behind, double pressure, double radius) const;
   double Middle() const { return this->tipLength + 0.5 * this->length; } ///< mm behind the tip

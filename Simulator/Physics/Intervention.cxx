@@ -31,6 +31,8 @@ constexpr double SpinDrag = 1e-6; // N s
 constexpr int MinimumSegments = 4;
 constexpr double CatheterReach = 10.0; // mm into the vessel
 constexpr double BalloonParked = 5.0;  // mm behind the simulated wire's end, at the beginning
+constexpr double ParkedWithin = 1.0;   // mm from there: it can be exchanged
+constexpr double Emptied = 0.5;        // atm, likewise
 
 void RequireWithin(double value, double low, double high, const char* name)
 {
@@ -53,6 +55,8 @@ enum class Notice : int
   Reset,
   PutBack,
   BalloonLimit,
+  StentInGuide,
+  NotExchanged,
   Count
 };
 
@@ -63,7 +67,23 @@ const char* const NoticeText[] = { "the input is not finite: the instruments are
   "no more of the wire can be simulated: it is advanced no further",
   "the wire's equations could not be solved: it is set back to where it was last sane",
   "the wire left the lumen and was put back",
-  "the balloon is at the end of its way: it has to stay on the wire, and in the guide" };
+  "the balloon is at the end of its way: it has to stay on the wire, and in the guide",
+  "the stent is not wholly out of the guide catheter: its balloon is not inflated",
+  "the balloon is not exchanged: first it has to be emptied and drawn back into the guide" };
+}
+
+void RequireFit(const BalloonCatheter& balloon, const GuideCatheter& catheter)
+{
+  balloon.Validate();
+  if (balloon.Profile() >= catheter.innerRadius)
+  {
+    char text[256];
+    std::snprintf(text, sizeof(text),
+      "the balloon '%s' is thicker (radius %.3f mm) than the inside of the catheter '%s' (radius "
+      "%.3f mm)",
+      balloon.name.c_str(), balloon.Profile(), catheter.name.c_str(), catheter.innerRadius);
+    throw std::invalid_argument(text);
+  }
 }
 
 void InterventionSettings::Validate() const
@@ -133,8 +153,10 @@ struct Intervention::Internals : ContactSurface
   std::unique_ptr<DilatableWall> Opening;
   VesselWay SleeveWay;
   int SleeveWayBranch = -1;
-  double SleeveHand = 0.0; // as accepted
-  double Inflator = 0.0;   // atm
+  double SleeveStart = 0.0; // u, where it is parked
+  double SleeveHand = 0.0;  // as accepted
+  std::vector<PlacedStent> Stents;
+  double Inflator = 0.0; // atm
 
   struct Sane
   {
@@ -224,13 +246,41 @@ struct Intervention::Internals : ContactSurface
     if (this->InSleeve(segment))
     {
       this->NoFriction(contacts);
+      // Not without a stent: recordings of such sessions keep their bits.
+      if (!this->Stents.empty() && this->Sleeve->Opened(this->BehindSleeve(segment)))
+      {
+        this->OnlyAcross(this->Rod->Axis(segment), contacts);
+      }
     }
   }
 
+  /// mm behind the sleeve's tip.
+  double BehindSleeve(std::int64_t segment) const
+  {
+    return this->Places[segment] - this->Fed + this->Sleeve->Tip();
+  }
   bool InSleeve(std::int64_t segment) const
   {
-    return this->Sleeve &&
-      this->Sleeve->Covers(this->Places[segment] - this->Fed + this->Sleeve->Tip());
+    return this->Sleeve && this->Sleeve->Covers(this->BehindSleeve(segment));
+  }
+  /// An open balloon in a stent is pressed along the vessel where that narrows; the wire in it is not: it slides.
+  static void OnlyAcross(const Vector3& axis, SampleContacts& contacts)
+  {
+    constexpr double Least = 0.3; // of a normal that is across
+    int kept = 0;
+    for (int n = 0; n < contacts.count; ++n)
+    {
+      ContactPlane plane = contacts.plane[n];
+      const Vector3 across = plane.normal - plane.normal.dot(axis) * axis;
+      const double share = across.norm();
+      if (share > Least)
+      {
+        plane.normal = across / share;
+        plane.gap /= share;
+        contacts.plane[kept++] = plane;
+      }
+    }
+    contacts.count = kept;
   }
   /// What touches is the sleeve; its friction is the sleeve's.
   static void NoFriction(SampleContacts& contacts)
@@ -574,6 +624,14 @@ void Intervention::Internals::OpenWall()
   }
   this->Sleeve->Inflate(this->FrameSeconds, this->Inflator, this->SleevePlace(), this->CatheterTip,
     this->SleeveWay, *this->Opening);
+  if (std::optional<PlacedStent> placed = this->Sleeve->TakePlaced())
+  {
+    this->Stents.push_back(std::move(*placed));
+  }
+  if (this->Sleeve->Report().caught)
+  {
+    this->Say(Notice::StentInGuide);
+  }
 }
 
 void Intervention::Internals::DriveSleeve(const DriveInput& input)
@@ -597,21 +655,10 @@ void Intervention::Internals::DriveSleeve(const DriveInput& input)
 /// @throws std::invalid_argument  it does not fit
 void Intervention::Internals::TakeBalloon(const BalloonCatheter& balloon)
 {
-  balloon.Validate();
-  if (balloon.crossingRadius >= this->Catheter.innerRadius ||
-    balloon.shaftRadius >= this->Catheter.innerRadius)
-  {
-    char text[256];
-    std::snprintf(text, sizeof(text),
-      "the balloon '%s' is thicker (radius %.3f mm) than the inside of the catheter '%s' (radius "
-      "%.3f mm)",
-      balloon.name.c_str(), std::max(balloon.crossingRadius, balloon.shaftRadius),
-      this->Catheter.name.c_str(), this->Catheter.innerRadius);
-    throw std::invalid_argument(text);
-  }
+  RequireFit(balloon, this->Catheter);
   const WallTopology& topology = this->Motion->Topology();
-  this->Sleeve = std::make_unique<BalloonOnWire>(
-    balloon, this->Catheter, this->CatheterTip - this->Settings.insideCatheter - BalloonParked);
+  this->SleeveStart = this->CatheterTip - this->Settings.insideCatheter - BalloonParked;
+  this->Sleeve = std::make_unique<BalloonOnWire>(balloon, this->Catheter, this->SleeveStart);
   this->Opening = std::make_unique<DilatableWall>(topology, this->NextPoints, this->Axis);
   int root = 0;
   while (FirstAxisPoint(topology, root) < static_cast<std::int64_t>(this->RootFirst))
@@ -795,8 +842,7 @@ void Intervention::Internals::Measure()
     const std::int64_t index = contact.segment * this->Rod->SamplesPerSegment() + contact.sample;
     // An open balloon's force on the wall is that of its balance.
     if (!this->InVessel[index] ||
-      (this->Sleeve &&
-        this->Sleeve->Opened(this->Places[contact.segment] - this->Fed + this->Sleeve->Tip())))
+      (this->Sleeve && this->Sleeve->Opened(this->BehindSleeve(contact.segment))))
     {
       continue;
     }
@@ -1043,6 +1089,75 @@ const BalloonOnWire* Intervention::Balloon() const
 const DilatableWall* Intervention::Dilated() const
 {
   return this->Data->Opening.get();
+}
+
+const std::vector<PlacedStent>& Intervention::Stents() const
+{
+  return this->Data->Stents;
+}
+
+void Intervention::StentShapes(std::vector<StentShape>& shapes) const
+{
+  const Internals& data = *this->Data;
+  shapes.clear();
+  std::vector<Vector3> axis;
+  if (!data.Stents.empty())
+  {
+    data.Motion->AxisPositions(data.Phase, axis);
+  }
+  for (const PlacedStent& stent : data.Stents)
+  {
+    StentShape shape;
+    shape.design = stent.design;
+    for (std::size_t n = 0; n < stent.points.size(); ++n)
+    {
+      shape.line.push_back(axis[stent.points[n]]);
+      shape.radii.push_back(data.Opening->Rings(stent.points[n])[stent.rings[n]].radius);
+    }
+    shapes.push_back(std::move(shape));
+  }
+  if (data.Sleeve && data.Sleeve->Report().crimped)
+  {
+    StentShape shape;
+    shape.design = *data.Sleeve->Stent();
+    std::vector<double> radii;
+    this->BalloonLine(shape.line, radii);
+    // From the tip on, a point each Spacing.
+    const double half = 0.5 * shape.design.CrimpedLength();
+    const double middle = data.Sleeve->Device().Middle();
+    const auto number = [&](double behind)
+    {
+      return std::min(shape.line.size(),
+        static_cast<std::size_t>(std::ceil(std::max(0.0, behind) / BalloonOnWire::Spacing)));
+    };
+    const std::size_t end = number(middle + half);
+    shape.line.resize(end);
+    shape.line.erase(shape.line.begin(),
+      shape.line.begin() + static_cast<std::ptrdiff_t>(std::min(end, number(middle - half))));
+    std::reverse(shape.line.begin(), shape.line.end());
+    shape.radii.assign(shape.line.size(), shape.design.crimpedRadius - shape.design.strut);
+    shapes.push_back(std::move(shape));
+  }
+}
+
+bool Intervention::Exchange(const BalloonCatheter& balloon)
+{
+  Internals& data = *this->Data;
+  if (!data.Sleeve)
+  {
+    throw std::logic_error("there is no balloon in this session that could be exchanged");
+  }
+  RequireFit(balloon, data.Catheter);
+  if (data.Sleeve->Tip() > data.SleeveStart + ParkedWithin ||
+    data.Sleeve->Report().pressure > Emptied)
+  {
+    data.Say(Notice::NotExchanged);
+    return false;
+  }
+  data.Sleeve = std::make_unique<BalloonOnWire>(balloon, data.Catheter, data.SleeveStart);
+  data.Inflator = 0.0;
+  data.Report.balloon = data.Sleeve->Report();
+  return true;
 }
 
 std::vector<std::string> Intervention::TakeMessages()

@@ -63,6 +63,17 @@ struct TickReport
   BalloonReport balloon;
 };
 
+/// A stent as it lies now.
+struct StentShape
+{
+  StentDesign design;
+  std::vector<Vector3> line; ///< mm, from its end near the ostium on
+  std::vector<double> radii; ///< mm, inside
+};
+
+/// @throws std::invalid_argument  naming balloon and property; a balloon that does not fit into the catheter
+void RequireFit(const BalloonCatheter& balloon, const GuideCatheter& catheter);
+
 /**
  * Runs at a fixed step, on one thread, and allocates nothing after the first ticks. The same binary,
  * model and input give the same bits.
@@ -103,8 +114,19 @@ public:
   const BalloonOnWire* Balloon() const;
   /// What the balloon opens; null without.
   const DilatableWall* Dilated() const;
+  /// Stents that are left in the wall, in the order in which they were.
+  const std::vector<PlacedStent>& Stents() const;
+  /// These as they lie now, and last the one that is on the balloon.
+  void StentShapes(std::vector<StentShape>& shapes) const;
 
-  /// FNV-1a over the bits of the wire's, the balloon's, the hands' and the heart's state. What the wall keeps to be faster, and the
+  /**
+   * Another balloon catheter in place of this one, before the next step.
+   * @return false: this one is not wholly in the guide and empty; a message says so
+   * @throws as RequireFit; std::logic_error: there is no balloon in this session
+   */
+  bool Exchange(const BalloonCatheter& balloon);
+
+  /// FNV-1a over the bits of the wire's, the balloon's, the stents', the hands' and the heart's state. What the wall keeps to be faster, and the
   /// forces in the joints, follow from these and the ticks before.
   std::uint64_t StateHash() const;
 

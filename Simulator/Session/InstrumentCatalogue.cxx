@@ -129,6 +129,23 @@ constexpr BalloonNumber BalloonNumbers[] = { { "length_mm", &BalloonCatheter::le
   { "inflation_resistance_atm_s_per_mL", &BalloonCatheter::inflationResistance, 1.0 },
   { "contrast_fraction", &BalloonCatheter::fillFraction, 1.0 } };
 
+/// Likewise of the stent on it.
+struct StentNumber
+{
+  const char* name;
+  double StentDesign::*value;
+  double scale;
+};
+constexpr StentNumber StentNumbers[] = { { "diameter_mm", &StentDesign::diameter, 1.0 },
+  { "length_mm", &StentDesign::length, 1.0 },
+  { "crimped_profile_mm", &StentDesign::crimpedRadius, 0.5 },
+  { "strut_mm", &StentDesign::strut, 1.0 }, { "recoil", &StentDesign::recoil, 1.0 },
+  { "foreshortening", &StentDesign::foreshortening, 1.0 },
+  { "greatest_diameter_mm", &StentDesign::greatestDiameter, 1.0 },
+  { "opening_pressure_atm", &StentDesign::openingPressure, 1.0 },
+  { "collapse_pressure_atm", &StentDesign::collapsePressure, 1.0 },
+  { "metal_share", &StentDesign::metalShare, 1.0 } };
+
 template <typename Instrument>
 void Check(const Instrument& instrument, const std::string& where)
 {
@@ -253,6 +270,20 @@ CatalogueBalloon BalloonFromJson(const Json& object, const std::string& where)
     row.Done();
   }
   result.sources = SourcesOf(fields);
+  if (fields.Has("stent"))
+  {
+    JsonFields stent(fields.Object("stent"), fields.Where() + ", stent");
+    balloon.stent.emplace();
+    for (const StentNumber& number : StentNumbers)
+    {
+      (*balloon.stent).*number.value = number.scale * stent.Number(number.name, 0.0, Any);
+    }
+    for (const auto& [property, source] : SourcesOf(stent))
+    {
+      result.sources["stent, " + property] = source;
+    }
+    stent.Done();
+  }
   fields.Done();
   Check(balloon, where);
   return result;
@@ -270,6 +301,13 @@ Json BalloonToJson(const BalloonCatheter& balloon)
   {
     json["compliance"].push_back(
       { { "pressure_atm", row.pressure }, { "diameter_mm", row.diameter } });
+  }
+  if (balloon.stent)
+  {
+    for (const StentNumber& number : StentNumbers)
+    {
+      json["stent"][number.name] = (*balloon.stent).*number.value / number.scale;
+    }
   }
   return json;
 }

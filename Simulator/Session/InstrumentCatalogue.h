@@ -1,6 +1,6 @@
 /**
  * @file InstrumentCatalogue.h
- * @brief Guidewires, guide catheters and balloons by name, read from JSON. docs/simulator-files.md has the format.
+ * @brief Guidewires, guide catheters, balloons and stents by name, read from JSON. docs/simulator-files.md has the format.
  */
 #ifndef DynamicCoronary_InstrumentCatalogue_h
 #define DynamicCoronary_InstrumentCatalogue_h

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdarg>
 #include <cstdio>
 
 namespace coronary
@@ -11,6 +12,34 @@ namespace
 constexpr double PressureTime = 2.0;    // s of the running means
 constexpr double ThinnestGraded = 0.75; // mm, radius without the lesion, as in docs/lesions.md
 constexpr double Relaxed = 0.5;         // atm: what is below is another inflation
+constexpr double SpringBack = 0.1;      // s after which a stent is judged
+
+std::string Format(const char* text, ...)
+{
+  char buffer[300];
+  std::va_list values;
+  va_start(values, text);
+  std::vsnprintf(buffer, sizeof(buffer), text, values);
+  va_end(values);
+  return buffer;
+}
+
+bool Has(const std::vector<StentRingResult>& rings, std::int64_t point)
+{
+  return std::any_of(
+    rings.begin(), rings.end(), [&](const StentRingResult& ring) { return ring.point == point; });
+}
+}
+
+const char* NameOf(ProcedureEvent::Kind kind, const char*& quantity)
+{
+  static const char* const names[][2] = { { "over_expansion", "diameter_over_reference" },
+    { "over_rated_pressure", "atm" }, { "stent_over_expansion", "diameter_over_greatest" },
+    { "under_expansion", "area_over_reference" }, { "malapposition", "gap_mm" },
+    { "geographic_miss", "disease_mm" }, { "beyond_vessel", "stent_mm" } };
+  const auto& [name, value] = names[static_cast<int>(kind)];
+  quantity = value;
+  return name;
 }
 
 LesionWatch::LesionWatch(const WallTopology& topology, const ContrastModel& medium)
@@ -31,6 +60,17 @@ LesionWatch::LesionWatch(const WallTopology& topology, const ContrastModel& medi
     if (one.reference < ThinnestGraded)
     {
       continue;
+    }
+    const auto axisAt = [&](std::int64_t point)
+    {
+      const int b = this->BranchOf(point);
+      return topology.axis[b][point - this->First[b]];
+    };
+    for (std::size_t n = 0; n < lesion.points.size(); ++n)
+    {
+      one.along.push_back(n == 0
+          ? 0.0
+          : one.along.back() + (axisAt(lesion.points[n]) - axisAt(lesion.points[n - 1])).norm());
     }
     this->Distal.push_back({ branch, along.abscissa[last - this->First[branch]] });
     one.lesion = std::move(lesion);
@@ -80,38 +120,58 @@ void LesionWatch::StepFlow(double seconds, const Intervention& instruments, Cont
   }
 }
 
-void LesionWatch::StepTick(double seconds, const Intervention& instruments,
-  const std::optional<BalloonCatheter>& balloon, std::vector<std::string>& said)
+std::string LesionWatch::NameAt(std::int64_t point) const
 {
-  if (!balloon)
-  {
-    return;
-  }
+  const int branch = point >= 0 ? this->BranchOf(point) : -1;
+  const bool named = branch >= 0 && branch < static_cast<int>(this->Names.size());
+  return named ? this->Names[branch] : "the guide catheter";
+}
+
+/// @param point  of the axes where it is; -1: in the guide
+void LesionWatch::Tell(
+  ProcedureEvent event, std::int64_t point, const std::string& text, std::vector<std::string>& said)
+{
+  event.branch = point >= 0 ? this->BranchOf(point) : -1;
+  this->Events_.push_back(event);
+  said.push_back(point < 0 ? text + " It is in the guide catheter."
+                           : Format("%s It is in %s, %.1f mm from the ostium.", text.c_str(),
+                               this->NameAt(point).c_str(), event.place));
+}
+
+void LesionWatch::StepTick(double seconds, const Intervention& instruments,
+  const BalloonCatheter& balloon, std::vector<std::string>& said)
+{
+  using Kind = ProcedureEvent::Kind;
   const BalloonReport& report = instruments.Report().balloon;
-  const int branch = report.place >= 0 ? this->BranchOf(report.place) : -1;
-  const auto add = [&](ProcedureEvent::Kind kind, double value, const char* text)
-  {
-    this->Events_.push_back({ kind, seconds, branch, value });
-    char sentence[200];
-    const bool named = branch >= 0 && branch < static_cast<int>(this->Names.size());
-    std::snprintf(sentence, sizeof(sentence), text, value,
-      named ? this->Names[branch].c_str() : "the guide catheter");
-    said.emplace_back(sentence);
-  };
   const double tearing = instruments.Dilated()->Settings().tearing;
+  const char* name = balloon.name.c_str();
   if (report.stretch > tearing && !this->Stretched)
   {
-    add(ProcedureEvent::Kind::OverExpansion, report.stretch,
-      "The wall is stretched to %.2f of its reference diameter in %s: dissection threatens.");
+    this->Tell({ Kind::OverExpansion, seconds, -1, report.stretch, report.stretchedPlace },
+      report.stretched,
+      Format("The balloon '%s' stretches the wall to %.2f of its reference diameter: dissection "
+             "threatens.",
+        name, report.stretch),
+      said);
   }
-  if (report.pressure > balloon->ratedPressure && !this->Pressed)
+  if (report.pressure > balloon.ratedPressure && !this->Pressed)
   {
-    add(ProcedureEvent::Kind::OverPressure, report.pressure,
-      "The balloon is at %.1f atm in %s, above its rated pressure.");
+    this->Tell({ Kind::OverPressure, seconds, -1, report.pressure, report.middle }, report.place,
+      Format("The balloon '%s' is at %.1f atm, above its rated pressure.", name, report.pressure),
+      said);
   }
-  this->Stretched = report.stretch > tearing || (this->Stretched && report.pressure > Relaxed);
-  this->Pressed =
-    report.pressure > balloon->ratedPressure || (this->Pressed && report.pressure > Relaxed);
+  if (report.ringStretch > 1.0 && !this->Overwide)
+  {
+    this->Tell({ Kind::StentOverExpansion, seconds, -1, report.ringStretch, report.ringPlace },
+      report.ringPoint,
+      Format("The balloon '%s' opens a stent to %.2f of the diameter that its design allows.", name,
+        report.ringStretch),
+      said);
+  }
+  const bool open = report.pressure > Relaxed;
+  this->Stretched = report.stretch > tearing || (this->Stretched && open);
+  this->Pressed = report.pressure > balloon.ratedPressure || (this->Pressed && open);
+  this->Overwide = report.ringStretch > 1.0 || (this->Overwide && open);
   for (Watched& one : this->Lesions)
   {
     const std::vector<std::int64_t>& points = one.lesion.points;
@@ -121,6 +181,122 @@ void LesionWatch::StepTick(double seconds, const Intervention& instruments,
       one.stretch = report.stretch;
     }
   }
+  if (instruments.Stents().empty())
+  {
+    return;
+  }
+  if (open)
+  {
+    this->LastHeld = seconds;
+    this->ToJudge = true;
+  }
+  else if (this->ToJudge && seconds - this->LastHeld > SpringBack)
+  {
+    this->ToJudge = false;
+    const std::vector<StentResult> stents = this->Stents(instruments);
+    this->Judgements.resize(stents.size());
+    for (std::size_t n = 0; n < stents.size(); ++n)
+    {
+      this->Judge(seconds, stents[n], this->Judgements[n], said);
+    }
+  }
+}
+
+void LesionWatch::Judge(
+  double seconds, const StentResult& stent, Judged& before, std::vector<std::string>& said)
+{
+  using Kind = ProcedureEvent::Kind;
+  const char* name = stent.name.c_str();
+  const StentRingResult* narrowest = stent.Narrowest();
+  if (!narrowest)
+  {
+    return;
+  }
+  const double area = 0.25 * M_PI * narrowest->diameter * narrowest->diameter;
+  if (std::abs(area - before.leastArea) > 0.01 * area)
+  {
+    before.leastArea = area;
+    said.push_back(
+      Format("The stent of '%s' lies in %s, %.1f to %.1f mm from the ostium: least area %.2f mm2, "
+             "least expansion %.0f %% of the reference area, residual stenosis %.0f %%.",
+        name, stent.vessel.c_str(), stent.from, stent.to, area,
+        100.0 * stent.LeastExpanded()->Expansion(), 100.0 * stent.residual));
+  }
+  const auto tell = [&](bool now, bool& told, Kind kind, double value, const StentRingResult& where,
+                      const char* text)
+  {
+    if (now && !told)
+    {
+      this->Tell(
+        { kind, seconds, -1, value, where.place }, where.point, Format(text, name, value), said);
+    }
+    told = now;
+  };
+  const StentRingResult& tight = *stent.LeastExpanded();
+  tell(tight.Expansion() < StentResult::ExpansionTold, before.underExpanded, Kind::UnderExpansion,
+    tight.Expansion(), tight,
+    "The stent of '%s' is under-expanded: its area is %.2f of the reference.");
+  const StentRingResult& loose = *stent.GreatestGap();
+  tell(loose.gap > StentResult::GapTold, before.malapposed, Kind::Malapposition, loose.gap, loose,
+    "The stent of '%s' does not reach the wall: a gap of %.2f mm.");
+  const double missed = std::max(stent.missedBefore, stent.missedBehind);
+  const StentRingResult& end =
+    stent.missedBefore > stent.missedBehind ? stent.rings.front() : stent.rings.back();
+  tell(stent.missedAll || missed > StentResult::MissTold, before.missed, Kind::GeographicMiss,
+    missed, end,
+    stent.missedAll ? "The stent of '%s' covers no lesion."
+                    : "The stent of '%s' ends in the lesion: %.1f mm of it go on beside it.");
+  tell(stent.beyond > 0.0, before.beyond, Kind::BeyondVessel, stent.beyond, stent.rings.back(),
+    "The stent of '%s' is longer than the vessel that it is in: %.1f mm are beyond its end.");
+}
+
+std::vector<StentResult> LesionWatch::Stents(const Intervention& instruments) const
+{
+  std::vector<StentResult> results;
+  for (const PlacedStent& stent : instruments.Stents())
+  {
+    StentResult result = MeasureStent(stent, *instruments.Dilated());
+    if (!stent.points.empty())
+    {
+      result.vessel = this->NameAt(stent.points[stent.points.size() / 2]);
+    }
+    result.missedAll = !this->Lesions.empty();
+    results.push_back(std::move(result));
+  }
+  // Of each lesion, what is before the first and behind the last point that any stent covers.
+  for (const Watched& one : this->Lesions)
+  {
+    const std::vector<std::int64_t>& points = one.lesion.points;
+    const auto covers = [&](const StentResult& stent, std::size_t n)
+    { return Has(stent.rings, points[n]); };
+    std::size_t first = points.size();
+    std::size_t last = 0;
+    for (std::size_t n = 0; n < points.size(); ++n)
+    {
+      if (std::any_of(results.begin(), results.end(),
+            [&](const StentResult& stent) { return covers(stent, n); }))
+      {
+        first = std::min(first, n);
+        last = n;
+      }
+    }
+    for (StentResult& stent : results)
+    {
+      for (std::size_t n = first; n <= last && n < points.size(); ++n)
+      {
+        stent.missedAll = stent.missedAll && !covers(stent, n);
+      }
+      if (first < points.size() && covers(stent, first))
+      {
+        stent.missedBefore = std::max(stent.missedBefore, one.along[first]);
+      }
+      if (first < points.size() && covers(stent, last))
+      {
+        stent.missedBehind = std::max(stent.missedBehind, one.along.back() - one.along[last]);
+      }
+    }
+  }
+  return results;
 }
 
 std::vector<LesionResult> LesionWatch::Results(

@@ -1,12 +1,14 @@
 /**
  * @file LesionWatch.h
- * @brief The lesions of a session: how open they are, what flows through them, and what a balloon did to them.
+ * @brief The lesions of a session: how open they are, what flows through them, and what balloons and stents did to
+ * them.
  */
 #ifndef DynamicCoronary_LesionWatch_h
 #define DynamicCoronary_LesionWatch_h
 
 #include "ContrastModel.h"
 #include "Intervention.h"
+#include "StentResult.h"
 #include "VesselLesions.h"
 
 #include <string>
@@ -34,13 +36,22 @@ struct ProcedureEvent
   enum class Kind
   {
     OverExpansion, ///< wall beyond 1.3 of its reference: dissection threatens; value: diameter over reference
-    OverPressure ///< balloon beyond its rated pressure; value: atm
+    OverPressure,       ///< balloon beyond its rated pressure; value: atm
+    StentOverExpansion, ///< wider than its design allows; value: diameter over that
+    UnderExpansion,     ///< value: least area over the reference's
+    Malapposition,      ///< value: mm from stent to wall
+    GeographicMiss,     ///< value: mm of the disease that are beside the stent
+    BeyondVessel        ///< value: mm of the stent without a vessel around
   };
   Kind kind = Kind::OverExpansion;
   double seconds = 0.0;
   int branch = -1;
   double value = 0.0;
+  double place = 0.0; ///< mm from the ostium
 };
+
+/// Words of result files for it. @param quantity  name of its value, with unit
+const char* NameOf(ProcedureEvent::Kind kind, const char*& quantity);
 
 class LesionWatch
 {
@@ -50,12 +61,14 @@ public:
   /// A step of the flow: the lumen as it is now, and what lies in it, goes into the network.
   void StepFlow(double seconds, const Intervention& instruments, ContrastModel& medium);
   /// @param said  gets a sentence of each new event
-  void StepTick(double seconds, const Intervention& instruments,
-    const std::optional<BalloonCatheter>& balloon, std::vector<std::string>& said);
+  void StepTick(double seconds, const Intervention& instruments, const BalloonCatheter& balloon,
+    std::vector<std::string>& said);
 
   bool Empty() const { return this->Lesions.empty(); }
   std::vector<LesionResult> Results(
     const Intervention& instruments, const ContrastModel& medium) const;
+  /// Of the stents in the wall.
+  std::vector<StentResult> Stents(const Intervention& instruments) const;
   const std::vector<ProcedureEvent>& Events() const { return this->Events_; }
 
   ///@{
@@ -68,12 +81,27 @@ private:
   struct Watched
   {
     FoundLesion lesion;
-    double reference = 0.0; ///< mm, radius
+    std::vector<double> along; ///< mm from its beginning, of its points
+    double reference = 0.0;    ///< mm, radius
     double stretch = 0.0;
     double meanDistal = 0.0; ///< mmHg
     double meanAortic = 0.0;
   };
+  /// What was said of a stent.
+  struct Judged
+  {
+    double leastArea = 0.0;
+    bool underExpanded = false;
+    bool malapposed = false;
+    bool missed = false;
+    bool beyond = false;
+  };
   int BranchOf(std::int64_t point) const;
+  std::string NameAt(std::int64_t point) const;
+  void Tell(ProcedureEvent event, std::int64_t point, const std::string& text,
+    std::vector<std::string>& said);
+  void Judge(
+    double seconds, const StentResult& stent, Judged& before, std::vector<std::string>& said);
 
   std::vector<Watched> Lesions;
   std::vector<CatheterTip> Distal; ///< place behind each lesion
@@ -86,8 +114,12 @@ private:
   std::vector<double> Lumen_;
   std::vector<double> Filled_;
   std::vector<ProcedureEvent> Events_;
+  std::vector<Judged> Judgements; ///< of the stents
   bool Stretched = false;
   bool Pressed = false;
+  bool Overwide = false;
+  double LastHeld = 0.0; ///< s, when a balloon was open last
+  bool ToJudge = false;
 };
 }
 

@@ -33,7 +33,8 @@
  * - 2 force: four single-precision numbers: proximal force (N), proximal torque (N mm), tip force
  *   (N), greatest contact force (N); every 40 ticks
  * - 3 event: kind (1 byte), double. Kind 1: heart rate, beats a minute; 2: frames a second of
- *   fluoroscopy; 3: field of view, mm
+ *   fluoroscopy; 3: field of view, mm; 4: number of the balloon that is taken, 0 the scenario's
+ *   first
  * - 4 state hash: 8 bytes, FNV-1a of the instruments' state, and of contrast medium and exposures
  *   once there have been any; every 1000 ticks and at the end
  * - 5 image hash: 8 bytes, FNV-1a of an X-ray image's size and pixels; written with `--xray`
@@ -101,9 +102,10 @@ struct RecordedEvent
 {
   enum Kind : std::uint8_t
   {
-    HeartRate = 1,  ///< value: beats a minute
-    FrameRate = 2,  ///< frames a second of the X-ray images: 7.5, 15 or 30
-    FieldOfView = 3 ///< mm of the detector that are used, across
+    HeartRate = 1,   ///< value: beats a minute
+    FrameRate = 2,   ///< frames a second of the X-ray images: 7.5, 15 or 30
+    FieldOfView = 3, ///< mm of the detector that are used, across
+    Exchange = 4     ///< number of the balloon that is taken, as BalloonOf
   };
   std::uint8_t kind = 0;
   double value = 0.0;

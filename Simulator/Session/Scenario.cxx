@@ -447,17 +447,19 @@ Scenario ScenarioFromText(
     own = ReadCatalogue(FullPath(fields.Text("catalogue"), folder));
     catalogue = &own;
   }
-  const auto byName = [&](const char* what, const auto& find)
+  const auto named = [&](const std::string& name, const auto& find)
   {
     try
     {
-      return find(fields.Text(what));
+      return find(name);
     }
     catch (const std::invalid_argument& error)
     {
       throw std::invalid_argument(origin + ": " + error.what());
     }
   };
+  const auto byName = [&](const char* what, const auto& find)
+  { return named(fields.Text(what), find); };
   scenario.wire = fields.Any("wire").is_string()
     ? byName("wire", [&](const std::string& name) { return catalogue->Wire(name).wire; })
     : WireFromJson(fields.Object("wire"), origin).wire;
@@ -465,13 +467,26 @@ Scenario ScenarioFromText(
     ? byName(
         "catheter", [&](const std::string& name) { return catalogue->Catheter(name).catheter; })
     : CatheterFromJson(fields.Object("catheter"), origin).catheter;
+  const auto balloonOf = [&](const Json& entry)
+  {
+    return entry.is_string()
+      ? named(entry.get<std::string>(),
+          [&](const std::string& name) { return catalogue->Balloon(name).balloon; })
+      : BalloonFromJson(entry, origin).balloon;
+  };
   if (fields.Has("balloon"))
   {
-    scenario.balloon = fields.Any("balloon").is_string()
-      ? byName("balloon", [&](const std::string& name) { return catalogue->Balloon(name).balloon; })
-      : BalloonFromJson(fields.Object("balloon"), origin).balloon;
+    scenario.balloon = balloonOf(fields.Any("balloon"));
   }
   const Json none = Json::array();
+  for (const Json& entry : fields.Has("exchanges") ? fields.List("exchanges") : none)
+  {
+    scenario.exchanges.push_back(balloonOf(entry));
+  }
+  if (!scenario.exchanges.empty() && !scenario.balloon)
+  {
+    fields.Refuse("has 'exchanges' without a 'balloon' that they are for");
+  }
   for (const Json& entry : fields.Has("lesions") ? fields.List("lesions") : none)
   {
     scenario.lesions.push_back(
@@ -501,6 +516,10 @@ std::string ScenarioText(const Scenario& scenario)
   {
     json["balloon"] = BalloonToJson(*scenario.balloon);
   }
+  for (const BalloonCatheter& balloon : scenario.exchanges)
+  {
+    json["exchanges"].push_back(BalloonToJson(balloon));
+  }
   for (const VesselLesion& lesion : scenario.lesions)
   {
     json["lesions"].push_back(
@@ -508,6 +527,15 @@ std::string ScenarioText(const Scenario& scenario)
         { "degree", lesion.degree }, { "calcium_arc_deg", lesion.calciumArc } });
   }
   return json.dump(2) + "\n";
+}
+
+const BalloonCatheter* BalloonOf(const Scenario& scenario, std::size_t number)
+{
+  if (number == 0)
+  {
+    return scenario.balloon ? &*scenario.balloon : nullptr;
+  }
+  return number <= scenario.exchanges.size() ? &scenario.exchanges[number - 1] : nullptr;
 }
 
 std::vector<BuiltInScenario> BuiltInScenarios()

@@ -47,6 +47,7 @@ struct Scenario
   Guidewire wire;
   GuideCatheter catheter;
   std::optional<BalloonCatheter> balloon; ///< none: the session has none
+  std::vector<BalloonCatheter> exchanges; ///< for it, in their order; none without a balloon
   std::vector<VesselLesion> lesions;      ///< set into the vessels
   InterventionSettings settings;
   ImagingSettings imaging;
@@ -61,6 +62,9 @@ struct Scenario
  */
 Scenario ScenarioFromText(
   const std::string& text, const std::string& origin, const std::string& folder);
+
+/// @param number  0: the session begins with it; else of its exchanges; null: there is none
+const BalloonCatheter* BalloonOf(const Scenario& scenario, std::size_t number);
 
 /// JSON that says everything, the instruments' values included; reading it gives the same bits.
 std::string ScenarioText(const Scenario& scenario);

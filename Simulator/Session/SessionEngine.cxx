@@ -25,7 +25,7 @@ double SecondsSince(Clock::time_point start)
 }
 }
 
-/// Those of the mux, and the heart rates of a script.
+/// Those of the mux, and what a script chooses.
 class SessionEngine::HandsSource : public TickSource
 {
 public:
@@ -68,10 +68,8 @@ private:
     this->Raw = this->Mux->Next(this->Tick, 1.0 / this->Rate);
     ++this->Tick;
     const double end = static_cast<double>(this->Tick) / this->Rate;
-    for (const double heartRate : this->Script.HeartRates(begin, end))
-    {
-      this->Waiting.push_back({ RecordedEvent::HeartRate, heartRate });
-    }
+    const std::vector<RecordedEvent> chosen = EventsOf(this->Script, begin, end);
+    this->Waiting.insert(this->Waiting.end(), chosen.begin(), chosen.end());
     if (events)
     {
       events->insert(events->end(), this->Waiting.begin(), this->Waiting.end());

@@ -194,12 +194,14 @@ void SessionImager::ProjectInstruments(
   {
     this->ProjectBalloon(snapshot, geometry);
   }
+  this->ProjectStents(snapshot, geometry);
 }
 
 /// Shaft, markers, and what the balloon is filled with.
 void SessionImager::ProjectBalloon(const SessionSnapshot& snapshot, const CArmGeometry& geometry)
 {
-  const BalloonCatheter& balloon = *this->Scenario_.balloon;
+  const BalloonCatheter& balloon = *BalloonOf(this->Scenario_, snapshot.balloonNumber);
+  const bool crimped = snapshot.report.balloon.crimped;
   const double polymer = this->Materials.Of(XRayMaterial::Nylon);
   const double platinum = this->Materials.Of(XRayMaterial::Platinum);
   InstrumentChain shaft{ snapshot.balloon, {} };
@@ -210,7 +212,7 @@ void SessionImager::ProjectBalloon(const SessionSnapshot& snapshot, const CArmGe
   {
     const double length = (snapshot.balloon[n + 1] - snapshot.balloon[n]).norm();
     const double middle = behind + 0.5 * length;
-    const double folded = balloon.FoldedRadius(middle);
+    const double folded = crimped ? balloon.CrimpedRadius(middle) : balloon.FoldedRadius(middle);
     const double inner = std::min(0.8 * folded, InnerTube);
     shaft.segments.push_back({ folded, inner, polymer });
     const double toMarker = std::min(
@@ -225,6 +227,24 @@ void SessionImager::ProjectBalloon(const SessionSnapshot& snapshot, const CArmGe
   AddInstrument(shaft, geometry, this->InstrumentLayer);
   AddInstrument(markers, geometry, this->InstrumentLayer);
   AddContrast({ fill }, this->NeatContrast, geometry, this->InstrumentLayer);
+}
+
+/// Struts are thinner than a pixel: a tube of as much metal.
+void SessionImager::ProjectStents(const SessionSnapshot& snapshot, const CArmGeometry& geometry)
+{
+  const double metal = this->Materials.Of(XRayMaterial::CobaltChromium);
+  for (const StentShape& stent : snapshot.stents)
+  {
+    InstrumentChain tube{ stent.line, {} };
+    for (std::size_t n = 0; n + 1 < stent.line.size(); ++n)
+    {
+      const double inside = 0.5 * (stent.radii[n] + stent.radii[n + 1]);
+      const double outside = inside + stent.design.strut;
+      const double share = stent.design.metalShare * 0.5 * stent.design.diameter / inside;
+      tube.segments.push_back({ outside, inside, std::min(1.0, share) * metal });
+    }
+    AddInstrument(tube, geometry, this->InstrumentLayer);
+  }
 }
 
 InstrumentChain SessionImager::WireOf(const SessionSnapshot& snapshot) const

@@ -82,6 +82,7 @@ private:
   void ProjectInstruments(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   InstrumentChain WireOf(const SessionSnapshot& snapshot) const;
   void ProjectBalloon(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
+  void ProjectStents(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   void ProjectContrast(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
 
   Scenario Scenario_;

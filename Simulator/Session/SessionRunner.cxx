@@ -12,6 +12,20 @@ constexpr std::uint64_t ForceInterval = 40; // ticks between recorded forces: 50
 constexpr double Nothing = std::numeric_limits<double>::quiet_NaN();
 }
 
+std::vector<RecordedEvent> EventsOf(const DriveScript& script, double from, double to)
+{
+  std::vector<RecordedEvent> events;
+  for (const double heartRate : script.HeartRates(from, to))
+  {
+    events.push_back({ RecordedEvent::HeartRate, heartRate });
+  }
+  for (const double number : script.Exchanges(from, to))
+  {
+    events.push_back({ RecordedEvent::Exchange, number });
+  }
+  return events;
+}
+
 bool ReplaySource::At(std::uint64_t tick, SessionInput& input, std::vector<RecordedEvent>& events)
 {
   const bool goesOn = this->Replay.At(tick, input, this->Recorded);
@@ -39,10 +53,8 @@ bool ScriptSource::At(std::uint64_t tick, SessionInput& input, std::vector<Recor
   const double begin = static_cast<double>(tick) / this->Rate;
   const double end = static_cast<double>(tick + 1) / this->Rate;
   input = this->Script.At(end, this->Start);
-  for (const double heartRate : this->Script.HeartRates(begin, end))
-  {
-    events.push_back({ RecordedEvent::HeartRate, heartRate });
-  }
+  const std::vector<RecordedEvent> chosen = EventsOf(this->Script, begin, end);
+  events.insert(events.end(), chosen.begin(), chosen.end());
   return this->Endless || tick < this->Script.Ticks(this->Rate);
 }
 

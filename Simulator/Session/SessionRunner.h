@@ -19,6 +19,9 @@
 
 namespace coronary
 {
+/// What a script chooses at or after `from` and before `to`, s.
+std::vector<RecordedEvent> EventsOf(const DriveScript& script, double from, double to);
+
 /// Where the hands' movements come from.
 class TickSource
 {
@@ -122,7 +125,7 @@ public:
   std::uint64_t UnknownEvents() const { return this->Unknown; }
 
 private:
-  static constexpr std::size_t EventKinds = RecordedEvent::FieldOfView + 1; // the last kind
+  static constexpr std::size_t EventKinds = RecordedEvent::Exchange + 1; // the last kind
 
   bool Step();
   void TakePosted();

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <utility>
 
 namespace coronary
@@ -53,7 +54,6 @@ struct TrainingSession::Internals
     , Physics(this->Wall, scenario.wire, scenario.catheter, this->Settings, scenario.balloon)
     , Medium(this->Wall->Topology(), scenario.contrast, scenario.seed)
     , Watch(this->Wall->Topology(), this->Medium)
-    , Balloon(scenario.balloon)
     , Clock(AcquisitionOf(scenario))
     , HeartRate(this->Settings.heartRate)
     , TicksOfContrast(std::max<std::uint64_t>(
@@ -62,12 +62,18 @@ struct TrainingSession::Internals
   {
     this->Pose = scenario.imaging.pose;
     this->SetField();
+    for (std::size_t n = 0; const BalloonCatheter* one = BalloonOf(scenario, n); ++n)
+    {
+      RequireFit(*one, scenario.catheter);
+      this->Balloons.push_back(*one);
+    }
   }
 
   void SetView(const SessionInput& input);
   void SetField();
   void StepContrast(const SessionInput& input);
   void Measure(const SessionInput& input);
+  bool Exchange(double number);
 
   std::shared_ptr<WallMotion> Wall;
   InterventionSettings Settings;
@@ -75,7 +81,8 @@ struct TrainingSession::Internals
   Intervention Physics;
   ContrastModel Medium;
   LesionWatch Watch;
-  std::optional<BalloonCatheter> Balloon;
+  std::vector<BalloonCatheter> Balloons;
+  std::size_t BalloonNumber = 0;
   ExposureClock Clock;
   double HeartRate;
   std::uint64_t TicksOfContrast;
@@ -171,11 +178,36 @@ void TrainingSession::Internals::Measure(const SessionInput& input)
   {
     metrics.branches.push_back(tick.branch);
   }
-  this->Watch.StepTick(metrics.procedureSeconds, this->Physics, this->Balloon, this->Messages);
+  if (!this->Balloons.empty())
+  {
+    this->Watch.StepTick(
+      metrics.procedureSeconds, this->Physics, this->Balloons[this->BalloonNumber], this->Messages);
+  }
   if (metrics.events.size() < this->Watch.Events().size())
   {
     metrics.events = this->Watch.Events();
   }
+}
+
+bool TrainingSession::Internals::Exchange(double number)
+{
+  const bool known = number >= 0.0 && number < static_cast<double>(this->Balloons.size()) &&
+    number == std::floor(number);
+  if (!known)
+  {
+    char text[120];
+    std::snprintf(text, sizeof(text), "There is no balloon number %g: the scenario has %zu.",
+      number, this->Balloons.size());
+    this->Messages.emplace_back(text);
+    return false;
+  }
+  const auto wanted = static_cast<std::size_t>(number);
+  if (this->Physics.Exchange(this->Balloons[wanted]))
+  {
+    this->BalloonNumber = wanted;
+    this->Messages.push_back("The balloon '" + this->Balloons[wanted].name + "' is taken.");
+  }
+  return true;
 }
 
 RecordingHeader HeaderOf(const Scenario& scenario, std::uint64_t wallHash, const std::string& build,
@@ -261,6 +293,8 @@ bool TrainingSession::Apply(const RecordedEvent& event)
       data.Field = std::clamp(event.value, MinimumField, MaximumField);
       data.SetField();
       return true;
+    case RecordedEvent::Exchange:
+      return data.Exchange(event.value);
     default:
       return false;
   }
@@ -289,6 +323,11 @@ const ContrastModel& TrainingSession::Contrast() const
 std::vector<LesionResult> TrainingSession::Lesions() const
 {
   return this->Data->Watch.Results(this->Data->Physics, this->Data->Medium);
+}
+
+std::vector<StentResult> TrainingSession::Stents() const
+{
+  return this->Data->Watch.Stents(this->Data->Physics);
 }
 
 const WallTopology& TrainingSession::Topology() const
@@ -365,6 +404,8 @@ void TrainingSession::SnapshotOfImage(SessionSnapshot& snapshot) const
   data.Wall->AxisPositions(data.Report.tick.phase, snapshot.axis);
   snapshot.concentration = data.Medium.Concentration();
   snapshot.blush = data.Medium.BlushVolume();
+  snapshot.balloonNumber = data.BalloonNumber;
+  data.Physics.StentShapes(snapshot.stents);
   snapshot.lumen = data.Watch.Lumen();
   snapshot.filled = data.Watch.Filled();
   data.Physics.BalloonLine(snapshot.balloon, snapshot.balloonRadii);
@@ -375,6 +416,7 @@ void TrainingSession::SnapshotOfScene(
 {
   this->SnapshotOfImage(snapshot);
   snapshot.lesions = this->Lesions();
+  snapshot.results = this->Stents();
   this->Data->Physics.SomeWallPoints(wallPoints, snapshot.wall);
   this->Data->Medium.TracerPositions(snapshot.axis, snapshot.tracers, snapshot.tracerVolumes);
 }

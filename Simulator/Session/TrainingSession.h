@@ -80,8 +80,11 @@ struct SessionSnapshot
   std::vector<double> filled;       ///< mm, likewise: of the balloon catheter in it
   std::vector<Vector3> balloon;     ///< its line from its tip to where the simulated wire ends, mm
   std::vector<double> balloonRadii; ///< mm, outside
+  std::size_t balloonNumber = 0;    ///< as BalloonOf
+  std::vector<StentShape> stents;
   ///@}
   std::vector<LesionResult> lesions; ///< only of SnapshotOfScene
+  std::vector<StentResult> results;  ///< only of SnapshotOfScene: of the stents in the wall
   std::vector<Vector3> wall;         ///< only of SnapshotOfScene
   std::vector<Vector3> tracers;      ///< only of SnapshotOfScene, mm
   std::vector<float> tracerVolumes;  ///< mL of contrast medium
@@ -123,6 +126,7 @@ public:
   const Intervention& Instruments() const;
   const ContrastModel& Contrast() const;
   std::vector<LesionResult> Lesions() const;
+  std::vector<StentResult> Stents() const; ///< that are in the wall
   const WallTopology& Topology() const;
   const CArmPose& Pose() const;
   double FieldOfView() const; ///< mm of the detector, across

@@ -1,6 +1,7 @@
 #include "DilatableWall.h"
 
 #include "Fnv1a.h"
+#include "RisingRoot.h"
 
 #include <algorithm>
 #include <cmath>
@@ -37,7 +38,14 @@ double PlasticOpening(const WallStation& station, double radius)
 double WallPressure(const WallStation& station, double radius, const DilationSettings& settings)
 {
   const double opening = (radius - station.rest) / station.reference;
-  const double plaque = station.stiffness * (opening - PlasticOpening(station, radius));
+  double plaque = station.stiffness * (opening - PlasticOpening(station, radius));
+  if (station.stented >= 0 && opening > station.plastic && opening < station.held)
+  {
+    const double most = station.held - station.plastic;
+    const double c = settings.heldStiffening;
+    plaque =
+      station.stiffness * most * std::expm1(c * (opening - station.plastic) / most) / std::expm1(c);
+  }
   const double stretch = radius / station.reference - 1.0;
   return plaque +
     (stretch > 0.0 ? settings.meanPressure * std::expm1(settings.wallStiffening * stretch) : 0.0);
@@ -80,27 +88,175 @@ DilatableWall::DilatableWall(const WallTopology& topology, const std::vector<Vec
   this->Ratio.assign(this->Radii_.size(), 1.0);
 }
 
-void DilatableWall::Release()
+void DilatableWall::Remember(std::int64_t point)
 {
-  for (const std::int64_t point : this->Moved)
-  {
-    const WallStation& station = this->Stations_[point];
-    this->Radii_[point] = NaturalRadius(station, this->Settings_);
-    this->Ratio[point] = this->Radii_[point] / station.rest;
-  }
-}
-
-void DilatableWall::Hold(std::int64_t point, double radius)
-{
-  WallStation& station = this->Stations_[point];
-  station.plastic = PlasticOpening(station, radius);
-  this->Radii_[point] = radius;
-  this->Ratio[point] = radius / station.rest;
   const auto place = std::lower_bound(this->Moved.begin(), this->Moved.end(), point);
   if (place == this->Moved.end() || *place != point)
   {
     this->Moved.insert(place, point);
   }
+}
+
+void DilatableWall::SetRadius(std::int64_t point, double radius)
+{
+  this->Radii_[point] = radius;
+  this->Ratio[point] = radius / this->Stations_[point].rest;
+}
+
+void DilatableWall::Place(std::int64_t point, const StentRing& ring)
+{
+  WallStation& station = this->Stations_[point];
+  if (station.stented < 0)
+  {
+    station.stented = static_cast<std::int32_t>(this->Stented_.size());
+    station.held = (this->Radii_[point] - station.rest) / station.reference;
+    this->Stented_.emplace_back();
+  }
+  Stented& stented = this->Stented_[station.stented];
+  stented.rings.push_back(ring);
+  stented.coming = Coming::Back;
+  this->Remember(point);
+  this->ReleaseRing(point, stented.rings.size(), false);
+}
+
+const std::vector<StentRing>& DilatableWall::Rings(std::int64_t point) const
+{
+  static const std::vector<StentRing> none;
+  const std::int32_t stented = this->Stations_[point].stented;
+  return stented >= 0 ? this->Stented_[stented].rings : none;
+}
+
+double DilatableWall::InsideRadius(std::int64_t point) const
+{
+  const std::int32_t stented = this->Stations_[point].stented;
+  return stented >= 0 ? this->Stented_[stented].rings.back().radius : this->Radii_[point];
+}
+
+double DilatableWall::Gap(std::int64_t point) const
+{
+  const std::int32_t stented = this->Stations_[point].stented;
+  if (stented < 0)
+  {
+    return 0.0;
+  }
+  constexpr double Rounding = 1e-9; // mm
+  const StentRing& outer = this->Stented_[stented].rings.front();
+  const double gap = this->Radii_[point] - outer.radius - outer.thickness;
+  return gap > Rounding ? gap : 0.0;
+}
+
+/// Of the wall and so many rings from it; 0 where nothing presses back.
+double DilatableWall::Resistance(
+  const WallStation& station, const Stented& stented, std::size_t rings, double radius) const
+{
+  if (rings == 0)
+  {
+    return std::max(0.0, WallPressure(station, radius, this->Settings_));
+  }
+  const StentRing& ring = stented.rings[rings - 1];
+  return std::max(0.0,
+    RingPressure(ring, radius) +
+      this->Resistance(station, stented, rings - 1, radius + ring.thickness));
+}
+
+double DilatableWall::Resistance(std::int64_t point, double radius) const
+{
+  const WallStation& station = this->Stations_[point];
+  if (station.stented < 0)
+  {
+    return std::max(0.0, WallPressure(station, radius, this->Settings_));
+  }
+  const Stented& stented = this->Stented_[station.stented];
+  return this->Resistance(station, stented, stented.rings.size(), radius);
+}
+
+/// So many rings from the wall, the innermost of them held; 0: the wall is.
+void DilatableWall::HoldRing(std::int64_t point, std::size_t rings, double radius, bool flows)
+{
+  WallStation& station = this->Stations_[point];
+  if (rings == 0)
+  {
+    station.plastic = PlasticOpening(station, radius);
+    if (station.stented >= 0)
+    {
+      station.held = std::max(station.held, (radius - station.rest) / station.reference);
+    }
+    this->SetRadius(point, radius);
+    return;
+  }
+  Stented& stented = this->Stented_[station.stented];
+  StentRing& ring = stented.rings[rings - 1];
+  ring.radius = radius;
+  if (flows)
+  {
+    ring.natural = RingNatural(ring, radius);
+    ring.widest = std::max(ring.widest, ring.natural);
+  }
+  const double outside = radius + ring.thickness;
+  if (this->Resistance(station, stented, rings - 1, outside) > 0.0)
+  {
+    this->HoldRing(point, rings - 1, outside, flows);
+  }
+  else
+  {
+    this->ReleaseRing(point, rings - 1, flows);
+  }
+}
+
+void DilatableWall::ReleaseRing(std::int64_t point, std::size_t rings, bool flows)
+{
+  const WallStation& station = this->Stations_[point];
+  if (rings == 0)
+  {
+    this->SetRadius(point, NaturalRadius(station, this->Settings_));
+    return;
+  }
+  const Stented& stented = this->Stented_[station.stented];
+  const StentRing& ring = stented.rings[rings - 1];
+  // It stands where what presses it from outside is what it bears.
+  const double radius = RisingRoot(
+    [&](double at)
+    {
+      return RingPressure(ring, at) +
+        this->Resistance(station, stented, rings - 1, at + ring.thickness);
+    },
+    0.5 * ring.crimped, ring.natural, 1e-12);
+  this->HoldRing(point, rings, radius, flows);
+}
+
+void DilatableWall::Release()
+{
+  for (const std::int64_t point : this->Moved)
+  {
+    const WallStation& station = this->Stations_[point];
+    if (station.stented < 0)
+    {
+      this->SetRadius(point, NaturalRadius(station, this->Settings_));
+      continue;
+    }
+    // While a balloon holds them nothing flows inwards, though for a moment they are released here.
+    Stented& stented = this->Stented_[station.stented];
+    if (stented.coming != Coming::Stays)
+    {
+      const bool flows = stented.coming == Coming::Back;
+      this->ReleaseRing(point, stented.rings.size(), flows);
+      stented.coming = flows ? Coming::Stays : Coming::Back;
+    }
+  }
+}
+
+void DilatableWall::Hold(std::int64_t point, double radius)
+{
+  const std::int32_t number = this->Stations_[point].stented;
+  std::size_t rings = 0;
+  if (number >= 0)
+  {
+    Stented& stented = this->Stented_[number];
+    stented.coming = Coming::Held;
+    rings = stented.rings.size();
+  }
+  this->HoldRing(point, rings, radius, true);
+  this->Remember(point);
 }
 
 void DilatableWall::Deform(const std::vector<Vector3>& axis, std::vector<Vector3>& points) const
@@ -117,6 +273,11 @@ std::uint64_t DilatableWall::Hash(std::uint64_t hash) const
   {
     hash = Fnv1a(&this->Radii_[point], sizeof(double), hash);
     hash = Fnv1a(&this->Stations_[point].plastic, sizeof(double), hash);
+    for (const StentRing& ring : this->Rings(point))
+    {
+      hash = Fnv1a(&ring.natural, sizeof(double), hash);
+      hash = Fnv1a(&ring.radius, sizeof(double), hash);
+    }
   }
   return hash;
 }

@@ -10,7 +10,7 @@ namespace
 {
 const char* const NoBalloon = "none";
 
-/// The balloon, and the first lesion as it is now.
+/// The balloon, lesions and stents as they are now.
 QString TextOfBalloon(const SessionSnapshot& moment, bool hasBalloon)
 {
   const BalloonReport& balloon = moment.report.balloon;
@@ -20,6 +20,7 @@ QString TextOfBalloon(const SessionSnapshot& moment, bool hasBalloon)
     text += QString("\nBalloon  %1 mm out, %2 atm\n%3 to %4 mm wide, hand %5 N")
               .arg(Decimal(balloon.tip, 1), Decimal(balloon.pressure, 1), Decimal(balloon.least, 2),
                 Decimal(balloon.greatest, 2), Decimal(balloon.force, 2));
+    text += balloon.crimped ? "\nStent on it, not opened" : "";
   }
   for (const LesionResult& lesion : moment.lesions)
   {
@@ -27,6 +28,16 @@ QString TextOfBalloon(const SessionSnapshot& moment, bool hasBalloon)
               .arg(QString::fromStdString(lesion.vessel), Decimal(100.0 * lesion.degree, 0),
                 Decimal(100.0 * lesion.degreeBefore, 0), Decimal(lesion.pressureRatio, 2),
                 Decimal(lesion.reserve, 2));
+  }
+  for (const StentResult& stent : moment.results)
+  {
+    if (const StentRingResult* narrowest = stent.Narrowest())
+    {
+      text += QString("\nStent in %1  least %2 mm, %3 % of area\nresidual %4 %, gap %5 mm")
+                .arg(QString::fromStdString(stent.vessel), Decimal(narrowest->diameter, 2),
+                  Decimal(100.0 * stent.LeastExpanded()->Expansion(), 0),
+                  Decimal(100.0 * stent.residual, 0), Decimal(stent.GreatestGap()->gap, 2));
+    }
   }
   return text;
 }
@@ -57,7 +68,27 @@ InstrumentPanel::InstrumentPanel()
   form->addRow("Wire", this->Wire);
   form->addRow("Catheter", this->Catheter);
   form->addRow("Balloon", this->Balloon);
+  form->addRow(this->Next);
   form->addRow(this->Text);
+  QObject::connect(this->Next, &QPushButton::clicked,
+    [this]
+    {
+      const std::size_t next = (this->InUse + 1) % this->Balloons.size();
+      this->chosen({ RecordedEvent::Exchange, static_cast<double>(next) });
+    });
+}
+
+/// The balloon that an exchange takes: the next of the scenario's, after the last one the first.
+void InstrumentPanel::ShowNext()
+{
+  const std::size_t count = this->Balloons.size();
+  this->Next->setVisible(count > 1);
+  if (count > 1)
+  {
+    this->Next->setText(
+      "Exchange for " + QString::fromStdString(this->Balloons[(this->InUse + 1) % count]));
+    this->Next->setToolTip("Once the balloon is empty and wholly in the guide catheter");
+  }
 }
 
 void InstrumentPanel::ShowScenario(const Scenario& scenario)
@@ -66,11 +97,23 @@ void InstrumentPanel::ShowScenario(const Scenario& scenario)
   Choose(*this->Catheter, QString::fromStdString(scenario.catheter.name), {});
   Choose(*this->Balloon,
     scenario.balloon ? QString::fromStdString(scenario.balloon->name) : QString(NoBalloon), {});
+  this->Balloons.clear();
+  for (std::size_t n = 0; const BalloonCatheter* one = BalloonOf(scenario, n); ++n)
+  {
+    this->Balloons.push_back(one->name);
+  }
+  this->InUse = 0;
+  this->ShowNext();
 }
 
 void InstrumentPanel::ShowMoment(const SessionSnapshot& moment, const WallTopology& topology)
 {
   const TickReport& report = moment.report;
+  if (moment.balloonNumber != this->InUse)
+  {
+    this->InUse = moment.balloonNumber;
+    this->ShowNext();
+  }
   this->Text->setText(QString("Beyond the catheter  %1 mm, in %2\nCatheter beyond ostium  %3 mm\n"
                               "Hand  %4 N, %5 N mm    Tip  %6 N")
                         .arg(Decimal(report.inserted, 1), BranchName(topology, report.branch),
@@ -95,6 +138,7 @@ void InstrumentPanel::Take(Scenario& scenario) const
   if (balloon == NoBalloon)
   {
     scenario.balloon.reset();
+    scenario.exchanges.clear();
   }
   else if (!scenario.balloon || scenario.balloon->name != balloon)
   {

@@ -11,21 +11,29 @@
 #include <QGroupBox>
 #include <QLabel>
 
+#include <functional>
+
 namespace coronary
 {
 class InstrumentPanel : public QGroupBox
 {
 public:
   InstrumentPanel();
+  std::function<void(const RecordedEvent&)> chosen; ///< another balloon
   void ShowScenario(const Scenario& scenario);
   void ShowMoment(const SessionSnapshot& moment, const WallTopology& topology);
   /// What is chosen, into the scenario of a new session.
   void Take(Scenario& scenario) const;
 
 private:
+  void ShowNext();
+
   QComboBox* Wire = ChoiceBox();
   QComboBox* Catheter = ChoiceBox();
   QComboBox* Balloon = ChoiceBox();
+  QPushButton* Next = PanelButton("Exchange", "");
+  std::vector<std::string> Balloons; ///< names, in the order in which they are taken
+  std::size_t InUse = 0;
   QLabel* Text = new QLabel;
 };
 }

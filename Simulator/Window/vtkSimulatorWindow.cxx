@@ -213,6 +213,13 @@ void SessionWindow::ConnectPanels()
     }
   };
   this->Heart->chosen = [this](const RecordedEvent& event) { this->Chosen(event); };
+  this->Instruments->chosen = [this](const RecordedEvent& event)
+  {
+    if (this->Engine)
+    {
+      this->Engine->Post(event);
+    }
+  };
   QObject::connect(this->ForceButton, &QPushButton::clicked,
     [this]
     {

@@ -368,6 +368,8 @@ TEST_F(TestCoronarySimulator, TellsOfLesionsAndOfTheBalloon)
   EXPECT_EQ(this->Run("--headless --scenario s.json --ticks 10 --output out"), 0);
   EXPECT_FALSE(fs::exists(this->Folder / "out" / "balloon.csv")) << "of the session before";
 
+  EXPECT_FALSE(fs::exists(this->Folder / "out" / "stents.csv"));
+
   this->ExpectBadScenario([&](json& s) { s["lesions"] = { lesion("mLAD", 0.5) }; }, "no 'mLAD'");
   this->ExpectBadScenario([&](json& s) { s["lesions"] = { lesion("pRCA", 0.99) }; }, "'degree'");
   this->ExpectBadScenario([](json& s) { s["balloon"] = "none"; }, "has no balloon 'none'");
@@ -378,6 +380,21 @@ TEST_F(TestCoronarySimulator, TellsOfLesionsAndOfTheBalloon)
       s["balloon"] = "non-compliant-3.5x12";
     },
     "is thicker");
+  this->ExpectBadScenario(
+    [](json& s)
+    {
+      s["catheter"] = "JR4-4F";
+      s["balloon"] = "stent-3.5x12";
+    },
+    "'stent-3.5x12' is thicker");
+  this->ExpectBadScenario([](json& s) { s["exchanges"] = { "stent-2.5x12" }; }, "'exchanges'");
+  this->ExpectBadScenario(
+    [](json& s)
+    {
+      s["balloon"] = "stent-2.5x12";
+      s["exchanges"] = { "none" };
+    },
+    "has no balloon 'none'");
 }
 
 TEST_F(TestCoronarySimulator, RefusesInstrumentsThatDoNotFit)
@@ -434,7 +451,7 @@ TEST_F(TestCoronarySimulator, NamesTheProgramForPosing)
 TEST_F(TestCoronarySimulator, PrintsWhatItKnows)
 {
   ASSERT_EQ(this->Run("--list-scenarios"), 0);
-  for (const char* name : { "phantom-lca", "phantom-rca", "hra-lca", "lad-lesion" })
+  for (const char* name : { "phantom-lca", "phantom-rca", "hra-lca", "lad-lesion", "lad-stent" })
   {
     EXPECT_NE(ReadText(this->Folder / "stdout").find(name), std::string::npos);
   }

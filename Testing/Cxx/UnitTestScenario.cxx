@@ -68,7 +68,7 @@ public:
 TEST(UnitTestScenario, BuiltInOnesAreGood)
 {
   const auto list = coronary::BuiltInScenarios();
-  ASSERT_EQ(list.size(), 4U);
+  ASSERT_EQ(list.size(), 5U);
   for (const auto& one : list)
   {
     const Scenario scenario = LoadScenario(one.name);
@@ -88,6 +88,12 @@ TEST(UnitTestScenario, BuiltInOnesAreGood)
   EXPECT_NO_THROW(lesion.balloon->Validate());
   ASSERT_EQ(lesion.lesions.size(), 1U);
   EXPECT_EQ(lesion.lesions[0].degree, 0.7);
+  EXPECT_EQ(coronary::BalloonOf(lesion, 1), nullptr);
+  const Scenario stented = LoadScenario("lad-stent");
+  ASSERT_TRUE(stented.balloon && stented.balloon->stent);
+  EXPECT_NO_THROW(stented.balloon->Validate());
+  ASSERT_EQ(stented.exchanges.size(), 1U);
+  EXPECT_EQ(coronary::BalloonOf(stented, 1), &stented.exchanges[0]);
 }
 
 TEST(UnitTestScenario, TextSaysEverythingToTheBit)
@@ -111,6 +117,7 @@ TEST(UnitTestScenario, TextSaysEverythingToTheBit)
     }
     EXPECT_EQ(again.vessels.contraction.twist, scenario.vessels.contraction.twist);
     EXPECT_EQ(again.balloon.has_value(), scenario.balloon.has_value());
+    EXPECT_EQ(again.exchanges.size(), scenario.exchanges.size());
     EXPECT_EQ(again.lesions.size(), scenario.lesions.size());
   }
 }
