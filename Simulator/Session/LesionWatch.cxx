@@ -122,9 +122,9 @@ void LesionWatch::StepFlow(double seconds, const Intervention& instruments, Cont
 
 std::string LesionWatch::NameAt(std::int64_t point) const
 {
-  const int branch = point >= 0 ? this->BranchOf(point) : -1;
-  const bool named = branch >= 0 && branch < static_cast<int>(this->Names.size());
-  return named ? this->Names[branch] : "the guide catheter";
+  const auto branch = static_cast<std::size_t>(this->BranchOf(point));
+  const bool named = branch < this->Names.size() && !this->Names[branch].empty();
+  return named ? this->Names[branch] : "a vessel without a name";
 }
 
 /// @param point  of the axes where it is; -1: in the guide

@@ -483,6 +483,42 @@ const ProcedureEvent* EventOf(const Played& played, ProcedureEvent::Kind kind)
 }
 }
 
+TEST(Stent, BalloonsAreExchangedEmptyAndInTheGuide)
+{
+  const Scenario scenario = LoadScenario("lad-stent");
+  TrainingSession session(LesionedPhantom(), scenario);
+  SessionInput input = session.StartInput();
+  const auto run = [&](int ticks)
+  {
+    for (int tick = 0; tick < ticks; ++tick)
+    {
+      session.Step(input);
+    }
+    std::string said;
+    for (const std::string& message : session.TakeMessages())
+    {
+      said += message;
+    }
+    return said;
+  };
+  // A stent in the guide keeps its balloon from filling; a balloon without one fills.
+  input.drive.inflation = 10.0;
+  EXPECT_NE(run(1000).find("not wholly out of the guide"), std::string::npos);
+  EXPECT_TRUE(session.Report().tick.balloon.crimped);
+  EXPECT_TRUE(session.Apply({ RecordedEvent::Exchange, 1.0 }));
+  EXPECT_NE(run(4000).find("The balloon 'non-compliant-3.5x12' is taken."), std::string::npos);
+  EXPECT_FALSE(session.Report().tick.balloon.crimped);
+  EXPECT_GT(session.Report().tick.balloon.pressure, 1.0);
+  EXPECT_TRUE(session.Apply({ RecordedEvent::Exchange, 0.0 }));
+  EXPECT_NE(run(1).find("is not exchanged"), std::string::npos);
+  EXPECT_FALSE(session.Report().tick.balloon.crimped) << "it is the same";
+  for (const double number : { 2.0, -1.0, 0.5 })
+  {
+    EXPECT_FALSE(session.Apply({ RecordedEvent::Exchange, number }));
+    EXPECT_NE(run(1).find("There is no balloon number"), std::string::npos);
+  }
+}
+
 // Recorded hands: the stent opened, its balloon exchanged for a second one that opens it further, both withdrawn.
 TEST(Stent, TheRecordedDeploymentRepeatsToTheBit)
 {
