@@ -246,8 +246,7 @@ struct Intervention::Internals : ContactSurface
     if (this->InSleeve(segment))
     {
       this->NoFriction(contacts);
-      // Not without a stent: recordings of such sessions keep their bits.
-      if (!this->Stents.empty() && this->Sleeve->Opened(this->BehindSleeve(segment)))
+      if (this->Sleeve->Opened(this->BehindSleeve(segment)))
       {
         this->OnlyAcross(this->Rod->Axis(segment), contacts);
       }
@@ -263,7 +262,7 @@ struct Intervention::Internals : ContactSurface
   {
     return this->Sleeve && this->Sleeve->Covers(this->BehindSleeve(segment));
   }
-  /// An open balloon in a stent is pressed along the vessel where that narrows; the wire in it is not: it slides.
+  /// An open balloon is pressed along the vessel where that narrows; the wire in it is not: it slides.
   static void OnlyAcross(const Vector3& axis, SampleContacts& contacts)
   {
     constexpr double Least = 0.3; // of a normal that is across
