@@ -44,7 +44,7 @@ constexpr double LongestStem = 4.0;
 /// mm of a vein that are closed, at least: more than what is looked for beyond a tip.
 constexpr double CloseLength = 12.0;
 
-/// Fitted to the branches of phantoms (scripts/fit-odds.sh).
+/// Fitted to the branches of phantoms (scripts/fit-odds.sh); `others` with the rest held (fit-odds.py --only, bright-vein 310..323).
 constexpr double Intercept = -5.04;
 constexpr std::array<FittedSign, NumberOfVeinSigns> Signs{ {
   { "darker", 0.93 },

@@ -45,13 +45,19 @@ bool IsNumbered(const std::string& name, const std::string& start, const std::st
     name.find_first_not_of("0123456789", digits) == name.size() - end.size();
 }
 
+/// Empty where the branch has no name.
+std::string VesselOf(const WallTopology& topology, int branch)
+{
+  const auto n = static_cast<std::size_t>(branch);
+  return n < topology.groupName.size() ? topology.groupName[n] : "";
+}
+
 Json MetricsToJson(const SessionMetrics& metrics, const WallTopology& topology)
 {
   Json branches = Json::array();
   for (const int branch : metrics.branches)
   {
-    const auto n = static_cast<std::size_t>(branch);
-    const std::string name = n < topology.groupName.size() ? topology.groupName[n] : "";
+    const std::string name = VesselOf(topology, branch);
     // Parts of one segment between its side branches are one for people.
     if (branches.empty() || branches.back() != name)
     {
@@ -61,12 +67,11 @@ Json MetricsToJson(const SessionMetrics& metrics, const WallTopology& topology)
   Json events = Json::array();
   for (const ProcedureEvent& event : metrics.events)
   {
-    const auto n = static_cast<std::size_t>(event.branch);
     const char* quantity = "";
     const char* what = NameOf(event.kind, quantity);
     events.push_back({ { "seconds", event.seconds }, { "what", what },
-      { "vessel", n < topology.groupName.size() ? topology.groupName[n] : "" },
-      { "place_mm", event.place }, { quantity, event.value } });
+      { "vessel", VesselOf(topology, event.branch) }, { "place_mm", event.place },
+      { quantity, event.value } });
   }
   return { { "procedure_s", metrics.procedureSeconds },
     { "fluoroscopy_s", metrics.fluoroscopySeconds }, { "cine_s", metrics.cineSeconds },
@@ -77,20 +82,6 @@ Json MetricsToJson(const SessionMetrics& metrics, const WallTopology& topology)
     { "forceful_tip_s", metrics.forcefulSeconds }, { "wire_travel_mm", metrics.wireTravel },
     { "wire_turning_rad", metrics.wireTurning }, { "deepest_mm", metrics.deepest },
     { "path", branches }, { "events", events } };
-}
-
-std::string VesselAt(const WallTopology& topology, std::int64_t point)
-{
-  std::size_t branch = 0;
-  for (std::int64_t left = point; branch + 1 < topology.axis.size(); ++branch)
-  {
-    left -= static_cast<std::int64_t>(topology.axis[branch].size());
-    if (left < 0)
-    {
-      break;
-    }
-  }
-  return branch < topology.groupName.size() ? topology.groupName[branch] : "";
 }
 
 Json LesionsToJson(const std::vector<LesionResult>& lesions)
@@ -117,7 +108,7 @@ Json StentsToJson(const std::vector<StentResult>& stents)
     if (const StentRingResult* narrowest = one.Narrowest())
     {
       json["least_diameter_mm"] = narrowest->diameter;
-      json["least_area_mm2"] = 0.25 * M_PI * narrowest->diameter * narrowest->diameter;
+      json["least_area_mm2"] = narrowest->Area();
       json["expansion_percent"] = 100.0 * one.LeastExpanded()->Expansion();
       json["residual_stenosis_percent"] = 100.0 * one.residual;
       json["greatest_gap_mm"] = one.GreatestGap()->gap;
@@ -141,7 +132,7 @@ std::string StentTable(const std::vector<StentResult>& stents, const WallTopolog
     {
       char text[320];
       std::snprintf(text, sizeof(text), "%zu,%s,%s,%.6g,%.6g,%.6g,%.6g,%.6g\n", n + 1,
-        stents[n].name.c_str(), VesselAt(topology, ring.point).c_str(), ring.place, ring.diameter,
+        stents[n].name.c_str(), VesselOf(topology, ring.branch).c_str(), ring.place, ring.diameter,
         ring.lumen, ring.reference, ring.gap);
       table += text;
     }
@@ -197,14 +188,12 @@ public:
       this->WallFiles.push_back({ name, seconds });
     }
     char text[512];
-    const auto branch = static_cast<std::size_t>(report.branch);
-    const bool named = report.branch >= 0 && branch < topology.groupName.size();
     std::snprintf(text, sizeof(text),
       "%llu,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%d,%.9g,%.9g,%.9g,%d,%s\n",
       static_cast<unsigned long long>(this->Tick), seconds, report.phase, report.inserted,
       report.proximalForce, report.proximalTorque, report.tipForce, report.maximumForce,
       report.contacts, report.maximumPenetration, report.meanPenetration, report.jointGap,
-      report.outside, named ? topology.groupName[branch].c_str() : "");
+      report.outside, VesselOf(topology, report.branch).c_str());
     this->Forces += text;
     const ContrastBalance medium = session.Contrast().Balance();
     std::snprintf(text, sizeof(text), "%llu,%.9g,%.6g,%.9g,%.9g,%.9g,%.9g,%.9g,%.6g,%.6g,%.6g\n",

@@ -1,5 +1,6 @@
 #include "vtkSimulatorScene.h"
 
+#include "Numbers.h"
 #include "vtkDrawnSurface.h"
 
 #include "vtkActor.h"
@@ -320,7 +321,7 @@ void vtkSimulatorScene::SetStents(const std::vector<StentShape>& stents)
         const double t = (at - along[n - 1]) / (along[n] - along[n - 1]);
         const Vector3 tangent = (stent.line[n] - stent.line[n - 1]).normalized();
         side = (side - side.dot(tangent) * tangent).normalized();
-        const double angle = M_PI * k / Crowns;
+        const double angle = Pi * k / Crowns;
         const Vector3 out = std::cos(angle) * side + std::sin(angle) * tangent.cross(side);
         const double radius = stent.radii[n - 1] + t * (stent.radii[n] - stent.radii[n - 1]);
         const Vector3 point = stent.line[n - 1] + t * (stent.line[n] - stent.line[n - 1]) +

@@ -101,15 +101,16 @@ WireSection SectionOf(JsonFields& fields)
   return section;
 }
 
-/// A number of a balloon in its file: diameters there are radii here.
-struct BalloonNumber
+/// A number of a balloon, or of the stent on it, in its file: diameters there may be radii here.
+template <typename Device>
+struct DeviceNumber
 {
   const char* name;
-  double BalloonCatheter::*value;
+  double Device::*value;
   double scale;
 };
-constexpr BalloonNumber BalloonNumbers[] = { { "length_mm", &BalloonCatheter::length, 1.0 },
-  { "tip_mm", &BalloonCatheter::tipLength, 1.0 },
+constexpr DeviceNumber<BalloonCatheter> BalloonNumbers[] = {
+  { "length_mm", &BalloonCatheter::length, 1.0 }, { "tip_mm", &BalloonCatheter::tipLength, 1.0 },
   { "shoulder_mm", &BalloonCatheter::shoulder, 1.0 },
   { "tip_diameter_mm", &BalloonCatheter::tipRadius, 0.5 },
   { "crossing_profile_mm", &BalloonCatheter::crossingRadius, 0.5 },
@@ -127,24 +128,37 @@ constexpr BalloonNumber BalloonNumbers[] = { { "length_mm", &BalloonCatheter::le
   { "inflated_friction_on_wire_N", &BalloonCatheter::inflatedFriction, 1.0 },
   { "friction", &BalloonCatheter::friction, 1.0 },
   { "inflation_resistance_atm_s_per_mL", &BalloonCatheter::inflationResistance, 1.0 },
-  { "contrast_fraction", &BalloonCatheter::fillFraction, 1.0 } };
-
-/// Likewise of the stent on it.
-struct StentNumber
-{
-  const char* name;
-  double StentDesign::*value;
-  double scale;
+  { "contrast_fraction", &BalloonCatheter::fillFraction, 1.0 }
 };
-constexpr StentNumber StentNumbers[] = { { "diameter_mm", &StentDesign::diameter, 1.0 },
-  { "length_mm", &StentDesign::length, 1.0 },
+
+constexpr DeviceNumber<StentDesign> StentNumbers[] = {
+  { "diameter_mm", &StentDesign::diameter, 1.0 }, { "length_mm", &StentDesign::length, 1.0 },
   { "crimped_profile_mm", &StentDesign::crimpedRadius, 0.5 },
   { "strut_mm", &StentDesign::strut, 1.0 }, { "recoil", &StentDesign::recoil, 1.0 },
   { "foreshortening", &StentDesign::foreshortening, 1.0 },
   { "greatest_diameter_mm", &StentDesign::greatestDiameter, 1.0 },
   { "opening_pressure_atm", &StentDesign::openingPressure, 1.0 },
   { "collapse_pressure_atm", &StentDesign::collapsePressure, 1.0 },
-  { "metal_share", &StentDesign::metalShare, 1.0 } };
+  { "metal_share", &StentDesign::metalShare, 1.0 }
+};
+
+template <typename Device, std::size_t N>
+void ReadNumbers(JsonFields& fields, const DeviceNumber<Device> (&numbers)[N], Device& device)
+{
+  for (const DeviceNumber<Device>& number : numbers)
+  {
+    device.*number.value = number.scale * fields.Number(number.name, 0.0, Any);
+  }
+}
+
+template <typename Device, std::size_t N>
+void WriteNumbers(const Device& device, const DeviceNumber<Device> (&numbers)[N], Json& json)
+{
+  for (const DeviceNumber<Device>& number : numbers)
+  {
+    json[number.name] = device.*number.value / number.scale;
+  }
+}
 
 template <typename Instrument>
 void Check(const Instrument& instrument, const std::string& where)
@@ -257,10 +271,7 @@ CatalogueBalloon BalloonFromJson(const Json& object, const std::string& where)
   balloon.name = fields.Text("name");
   balloon.source = fields.Text("source", "");
   result.description = fields.Text("description", "");
-  for (const BalloonNumber& number : BalloonNumbers)
-  {
-    balloon.*number.value = number.scale * fields.Number(number.name, 0.0, Any);
-  }
+  ReadNumbers(fields, BalloonNumbers, balloon);
   for (const Json& entry : fields.List("compliance"))
   {
     JsonFields row(
@@ -273,11 +284,7 @@ CatalogueBalloon BalloonFromJson(const Json& object, const std::string& where)
   if (fields.Has("stent"))
   {
     JsonFields stent(fields.Object("stent"), fields.Where() + ", stent");
-    balloon.stent.emplace();
-    for (const StentNumber& number : StentNumbers)
-    {
-      (*balloon.stent).*number.value = number.scale * stent.Number(number.name, 0.0, Any);
-    }
+    ReadNumbers(stent, StentNumbers, balloon.stent.emplace());
     for (const auto& [property, source] : SourcesOf(stent))
     {
       result.sources["stent, " + property] = source;
@@ -292,10 +299,7 @@ CatalogueBalloon BalloonFromJson(const Json& object, const std::string& where)
 Json BalloonToJson(const BalloonCatheter& balloon)
 {
   Json json = { { "name", balloon.name }, { "source", balloon.source } };
-  for (const BalloonNumber& number : BalloonNumbers)
-  {
-    json[number.name] = balloon.*number.value / number.scale;
-  }
+  WriteNumbers(balloon, BalloonNumbers, json);
   json["compliance"] = Json::array();
   for (const ComplianceRow& row : balloon.compliance)
   {
@@ -304,10 +308,7 @@ Json BalloonToJson(const BalloonCatheter& balloon)
   }
   if (balloon.stent)
   {
-    for (const StentNumber& number : StentNumbers)
-    {
-      json["stent"][number.name] = (*balloon.stent).*number.value / number.scale;
-    }
+    WriteNumbers(*balloon.stent, StentNumbers, json["stent"]);
   }
   return json;
 }

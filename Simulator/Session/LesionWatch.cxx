@@ -212,7 +212,7 @@ void LesionWatch::Judge(
   {
     return;
   }
-  const double area = 0.25 * M_PI * narrowest->diameter * narrowest->diameter;
+  const double area = narrowest->Area();
   if (std::abs(area - before.leastArea) > 0.01 * area)
   {
     before.leastArea = area;
@@ -259,6 +259,10 @@ std::vector<StentResult> LesionWatch::Stents(const Intervention& instruments) co
     if (!stent.points.empty())
     {
       result.vessel = this->NameAt(stent.points[stent.points.size() / 2]);
+    }
+    for (StentRingResult& ring : result.rings)
+    {
+      ring.branch = this->BranchOf(ring.point);
     }
     result.missedAll = !this->Lesions.empty();
     results.push_back(std::move(result));

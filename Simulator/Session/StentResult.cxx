@@ -1,5 +1,7 @@
 #include "StentResult.h"
 
+#include "Numbers.h"
+
 #include <algorithm>
 
 namespace coronary
@@ -13,6 +15,11 @@ const StentRingResult* LeastOf(const std::vector<StentRingResult>& rings, const 
     [&](const StentRingResult& a, const StentRingResult& b) { return value(a) < value(b); });
   return least == rings.end() ? nullptr : &*least;
 }
+}
+
+double StentRingResult::Area() const
+{
+  return 0.25 * Pi * this->diameter * this->diameter;
 }
 
 const StentRingResult* StentResult::Narrowest() const

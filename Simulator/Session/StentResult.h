@@ -17,6 +17,7 @@ namespace coronary
 struct StentRingResult
 {
   std::int64_t point = 0;  ///< of the axes
+  int branch = -1;         ///< of the axes
   double place = 0.0;      ///< mm from the ostium
   double diameter = 0.0;   ///< inside
   double lumen = 0.0;      ///< of the vessel around it
@@ -26,6 +27,7 @@ struct StentRingResult
   {
     return this->diameter * this->diameter / (this->reference * this->reference);
   }
+  double Area() const; ///< mm^2, inside
 };
 
 struct StentResult
@@ -54,7 +56,7 @@ struct StentResult
   ///@}
 };
 
-/// Without what it has missed, and without names.
+/// Without what it has missed, names and branches.
 StentResult MeasureStent(const PlacedStent& stent, const DilatableWall& wall);
 }
 
