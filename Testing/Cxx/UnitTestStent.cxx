@@ -21,7 +21,7 @@ namespace
 {
 constexpr std::int64_t Middle = 80; // of a Tube's points
 
-const BalloonCatheter& System(const std::string& name)
+const BalloonCatheter& System(const char* name)
 {
   return BuiltInCatalogue().Balloon(name).balloon;
 }
