@@ -45,14 +45,10 @@ report_progress() {
   done
 }
 
-# Installs what is missing and builds what is installed, without the tests, for ParaView. LOG [option of cmake --build]...
-install_and_build() {
+# Builds without the tests, for ParaView. LOG [option of cmake --build]...
+build_product() {
   local log="$1"
   shift
-  if [ "$install" = yes ]; then
-    echo "== Packages"
-    scripts/install-dependencies.sh --tree paraview --no-tests
-  fi
   echo "== Building (log: $log)"
   mkdir -p "$(dirname "$log")"
   # A tree that has tests keeps them: its developer wants them.
@@ -68,4 +64,13 @@ install_and_build() {
     tail -n 40 "$log" >&2
     exit 1
   fi
+}
+
+# Installs what is missing and builds what is installed. LOG [option of cmake --build]...
+install_and_build() {
+  if [ "$install" = yes ]; then
+    echo "== Packages"
+    scripts/install-dependencies.sh --tree paraview --no-tests
+  fi
+  build_product "$@"
 }

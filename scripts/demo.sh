@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # From nothing to a beating coronary tree and Table 1: installs, builds, makes a gated CT series of the
 # phantom with its truth, runs every stage on the images (tracking even phases only, as the paper does),
-# holds the model against the truth in all phases, and renders pictures.
+# holds the model against the truth in all phases, and renders pictures. What the model does not need,
+# the simulator and ParaView's plugin, is built when the model is there.
 # Everything lands in build/ and demo-output/.
 set -euo pipefail
 
@@ -32,7 +33,7 @@ cd "$root"
 output=demo-output
 mkdir -p "$output"
 
-install_and_build build/logs/demo-build.log
+install_and_build build/logs/demo-build.log --target coronary-pipeline
 pipeline="$root/build/paraview/bin/coronary-pipeline"
 
 echo "== The beating phantom: 20 phases of gated CT, and the truth"
@@ -45,6 +46,9 @@ echo "== Its motion beside published values"
 echo "== From the images to the coronary arteries"
 "$pipeline" run "$output/phantom/series.json" --tracked even --output "$output/run"
 
+echo "== The run to look at: its vessels in the image"
+"$pipeline" review "$output/run"
+
 echo "== The model against the truth: Table 1, ours beside the paper's"
 evaluate=("$pipeline" evaluate --result "$output/run" --truth "$output/phantom" --name "phantom 1"
   --output "$output/evaluation")
@@ -53,9 +57,10 @@ if [ "$pictures" = yes ]; then
 else
   "${evaluate[@]}" --no-pictures
 fi
+echo "   Look at it in a browser already: $output/evaluation/review.html"
 
-echo "== The run to look at: its vessels in the image"
-"$pipeline" review "$output/run"
+echo "== The simulator and ParaView's plugin"
+build_product build/logs/demo-build-rest.log
 
 echo "== A guidewire in that model, driven by a script"
 "$root/build/paraview/bin/coronary-simulator" --headless --scenario phantom-lca --vessels "$output/run" \
