@@ -52,6 +52,14 @@ void Request::Declare(CLI::App& app)
       "Scenario: a JSON file, or a built-in name; default: that of the recording to replay")
     ->type_name("FILE|NAME")
     ->group(what);
+  auto* patient =
+    app
+      .add_option("--patient", this->session.patient,
+        "A patient's gated CT (folder of DICOM files, series.json or volume): its model, made by "
+        "coronary-pipeline where --vessels (default: NAME-coronary) has none, in place of the "
+        "scenario's vessels, and the CT in the X-ray images")
+      ->type_name("PATH")
+      ->group(what);
   app
     .add_option("--vessels", this->session.vessels,
       "Folder of 'coronary-pipeline run' in place of the scenario's vessels")
@@ -85,6 +93,7 @@ void Request::Declare(CLI::App& app)
     app.add_option("--replay", this->session.replay, "Recording (.pcirec) to go through")
       ->type_name("FILE")
       ->excludes(heartRate)
+      ->excludes(patient)
       ->group(hands);
   app.add_option("--script", this->session.script, "Driving that is written down, JSON")
     ->type_name("FILE")
@@ -272,7 +281,7 @@ void Request::RunWindow() const
   onlyHeadless(chosen.ticks > 0, "--ticks");
   onlyHeadless(chosen.verify, "--verify");
   onlyHeadless(chosen.xray, "--xray");
-  if (chosen.scenario.empty() && chosen.replay.empty())
+  if (chosen.scenario.empty() && chosen.replay.empty() && chosen.patient.empty())
   {
     chosen.scenario = "phantom-lca";
   }
@@ -293,7 +302,7 @@ void Request::RunWindow() const
   const coronary::Scenario scenario = coronary::ScenarioOf(chosen);
   const auto load = [&](const coronary::WorldProgress& progress)
   {
-    coronary::SessionWorld world = coronary::LoadWorld(scenario, true, progress);
+    coronary::SessionWorld world = coronary::WorldOf(chosen, scenario, true, progress);
     if (!chosen.replay.empty())
     {
       coronary::CheckRecording(chosen.replay, world.scenario, world.wallHash, true);

@@ -418,7 +418,7 @@ std::string CohortJob::WriteTables() const
   const std::string log = (fs::path(this->Output) / "evaluation.txt").string();
   std::error_code ignored;
   fs::remove(log, ignored);
-  ChildProcess process(words, log);
+  ChildProcess process(ThisProgram, words, log);
   while (!process.HasEnded())
   {
     if (Interruption() != 0)

@@ -129,7 +129,8 @@ void CohortWork::Next()
   std::error_code ignored;
   this->LogBefore =
     fs::exists(this->Folder.log, ignored) ? fs::file_size(this->Folder.log, ignored) : 0;
-  this->Process = std::make_unique<ChildProcess>(this->Steps[this->Step], this->Folder.log);
+  this->Process =
+    std::make_unique<ChildProcess>(ThisProgram, this->Steps[this->Step], this->Folder.log);
 }
 
 double CohortWork::Seconds() const

@@ -18,7 +18,7 @@ namespace coronary
 namespace
 {
 /// One of the numbers of a PhantomMotionSummary.
-struct Measure
+struct MotionMeasure
 {
   const char* key;
   const char* title;
@@ -26,21 +26,21 @@ struct Measure
   double scale; ///< from the summary's unit to that of the title
 };
 
-constexpr Measure Amplitude = { "amplitude_mm", "amplitude (mm)", &PhantomMotionSummary::amplitude,
-  1.0 };
-constexpr Measure MeanSpeed = { "mean_speed_mm_per_s", "mean speed (mm/s)",
+constexpr MotionMeasure Amplitude = { "amplitude_mm", "amplitude (mm)",
+  &PhantomMotionSummary::amplitude, 1.0 };
+constexpr MotionMeasure MeanOfSpeed = { "mean_speed_mm_per_s", "mean speed (mm/s)",
   &PhantomMotionSummary::meanSpeed, 1.0 };
-constexpr Measure PeakSpeed = { "peak_speed_mm_per_s", "peak speed (mm/s)",
+constexpr MotionMeasure PeakSpeed = { "peak_speed_mm_per_s", "peak speed (mm/s)",
   &PhantomMotionSummary::peakSpeed, 1.0 };
-constexpr Measure SystolicRest = { "systolic_rest_ms", "systolic rest (ms)",
+constexpr MotionMeasure SystolicRest = { "systolic_rest_ms", "systolic rest (ms)",
   &PhantomMotionSummary::systolicRest, 1.0 };
-constexpr Measure DiastolicRest = { "diastolic_rest_ms", "diastolic rest (ms)",
+constexpr MotionMeasure DiastolicRest = { "diastolic_rest_ms", "diastolic rest (ms)",
   &PhantomMotionSummary::diastolicRest, 1.0 };
-constexpr Measure Strain = { "systolic_strain_percent", "systolic strain (%)",
+constexpr MotionMeasure Strain = { "systolic_strain_percent", "systolic strain (%)",
   &PhantomMotionSummary::systolicStrain, 100.0 };
 
-constexpr const Measure* Measures[] = { &Amplitude, &MeanSpeed, &PeakSpeed, &SystolicRest,
-  &DiastolicRest, &Strain };
+constexpr const MotionMeasure* MotionMeasures[] = { &Amplitude, &MeanOfSpeed, &PeakSpeed,
+  &SystolicRest, &DiastolicRest, &Strain };
 
 /// How a reference range is widened to what is plausible for one heart.
 enum class Spread
@@ -55,7 +55,7 @@ enum class Spread
 struct Reference
 {
   const char* artery;
-  const Measure* measure;
+  const MotionMeasure* measure;
   double low;
   double high;
   Spread spread;
@@ -66,24 +66,24 @@ struct Reference
 constexpr double ReferenceCycle = 0.8;
 constexpr Reference References[] = {
   { "LM", &Amplitude, 9.4, 12.0, Spread::Left },
-  { "LM", &MeanSpeed, 24.0, 29.0, Spread::Left },
+  { "LM", &MeanOfSpeed, 24.0, 29.0, Spread::Left },
   { "LM", &PeakSpeed, 51.0, 62.0, Spread::Left },
   { "proximal left tree (5 cm)", &SystolicRest, 55.0, 105.0, Spread::Published },
   { "proximal left tree (5 cm)", &DiastolicRest, 70.0, 154.0, Spread::Published },
   { "LAD proximal", &Amplitude, 10.0, 11.0, Spread::Left },
-  { "LAD proximal", &MeanSpeed, 26.0, 28.0, Spread::Left },
+  { "LAD proximal", &MeanOfSpeed, 26.0, 28.0, Spread::Left },
   { "LAD proximal", &PeakSpeed, 55.0, 59.0, Spread::Left },
   { "LAD mid", &Amplitude, 8.0, 8.0, Spread::Left },
-  { "LAD mid", &MeanSpeed, 19.0, 21.0, Spread::Left },
+  { "LAD mid", &MeanOfSpeed, 19.0, 21.0, Spread::Left },
   { "LAD mid", &PeakSpeed, 41.0, 45.0, Spread::Left },
   { "LAD distal", &Amplitude, 2.0, 4.0, Spread::Left },
   { "LCx", &Amplitude, 12.0, 12.0, Spread::Left },
-  { "LCx", &MeanSpeed, 31.0, 31.0, Spread::Left },
+  { "LCx", &MeanOfSpeed, 31.0, 31.0, Spread::Left },
   { "LCx", &PeakSpeed, 66.0, 66.0, Spread::Left },
   { "LCx", &Strain, 1.0, 1.0, Spread::Strains },
   { "OM", &Amplitude, 9.0, 10.0, Spread::Left },
   { "RCA proximal to mid", &Amplitude, 16.0, 18.0, Spread::Right },
-  { "RCA proximal to mid", &MeanSpeed, 45.0, 45.0, Spread::Right },
+  { "RCA proximal to mid", &MeanOfSpeed, 45.0, 45.0, Spread::Right },
   { "RCA proximal to mid", &PeakSpeed, 97.0, 97.0, Spread::Right },
   { "RCA proximal to mid", &SystolicRest, 42.0, 110.0, Spread::Published },
   { "RCA proximal to mid", &DiastolicRest, 23.0, 107.0, Spread::Published },
@@ -120,7 +120,7 @@ Range Widened(const Reference& reference)
   return { reference.low, reference.high };
 }
 
-const Reference* Find(const std::string& artery, const Measure& measure)
+const Reference* Find(const std::string& artery, const MotionMeasure& measure)
 {
   for (const Reference& reference : References)
   {
@@ -157,7 +157,7 @@ void PhantomMotionJob::Run() const
   {
     nlohmann::ordered_json entry = { { "name", summary.name } };
     auto references = nlohmann::ordered_json::object();
-    for (const Measure* measure : Measures)
+    for (const MotionMeasure* measure : MotionMeasures)
     {
       const double value = measure->scale * summary.*(measure->member);
       entry[measure->key] = value;

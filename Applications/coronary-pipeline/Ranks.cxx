@@ -484,13 +484,6 @@ void FinishRanks()
   Group() = std::make_unique<RankGroup>();
 }
 
-const std::vector<std::string>& RankVariables()
-{
-  static const std::vector<std::string> names = { "OMPI_", "PMIX_", "PMI_", "MPI_LOCALNRANKS",
-    "MPI_LOCALRANKID", "MV2_COMM_WORLD_", "PRTE_", "ORTE_" };
-  return names;
-}
-
 std::vector<std::string> LinesOfAll(const std::vector<std::string>& own)
 {
   std::string text;

@@ -97,9 +97,6 @@ void StartRanks();
 /// Ends MPI, where it was started.
 void FinishRanks();
 
-/// Names in the environment by which a child would take itself for a rank begin with one of these.
-const std::vector<std::string>& RankVariables();
-
 /// Lines of every rank on the first one, each once, those of the first rank first; the others get none.
 std::vector<std::string> LinesOfAll(const std::vector<std::string>& own);
 

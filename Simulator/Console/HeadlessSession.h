@@ -6,6 +6,7 @@
 #define DynamicCoronary_HeadlessSession_h
 
 #include "Scenario.h"
+#include "SessionWorld.h"
 
 #include <cstdint>
 #include <string>
@@ -15,7 +16,8 @@ namespace coronary
 struct HeadlessOptions
 {
   std::string scenario;     ///< file or built-in name; may be empty with replay
-  std::string vessels;      ///< folder in place of the scenario's vessels
+  std::string patient;      ///< images in place of the scenario's vessels and background
+  std::string vessels;      ///< folder in place of the scenario's vessels; of the patient's model
   std::string wire;         ///< of the built-in catalogue, in place of the scenario's
   std::string catheter;     ///< likewise
   std::string balloon;      ///< likewise
@@ -36,6 +38,11 @@ struct HeadlessOptions
 /// The scenario with what the options change.
 /// @throws UsageError, as LoadScenario
 Scenario ScenarioOf(const HeadlessOptions& options);
+
+/// The world of the options' session. A patient's model is made first, where it is not there.
+/// @throws as MakePatientModel, LoadWorld
+SessionWorld WorldOf(const HeadlessOptions& options, const Scenario& scenario, bool background,
+  const WorldProgress& progress);
 
 /// What a recording has to have in common with the session that replays it.
 /// @throws std::runtime_error  another tick rate; other vessels, if that is not allowed

@@ -4,6 +4,7 @@
 #include "FileSeries.h"
 #include "InstrumentCatalogue.h"
 #include "Interruption.h"
+#include "PatientModel.h"
 #include "Program.h"
 #include "ProgressDisplay.h"
 #include "SessionImager.h"
@@ -361,9 +362,10 @@ void CheckRecording(const std::string& path, const Scenario& scenario, std::uint
 Scenario ScenarioOf(const HeadlessOptions& options)
 {
   Scenario scenario;
-  if (!options.scenario.empty())
+  const bool ofPatient = !options.patient.empty();
+  if (!options.scenario.empty() || ofPatient)
   {
-    scenario = LoadScenario(options.scenario);
+    scenario = LoadScenario(options.scenario.empty() ? "patient-lca" : options.scenario);
   }
   else if (!options.replay.empty())
   {
@@ -375,14 +377,23 @@ Scenario ScenarioOf(const HeadlessOptions& options)
   {
     throw UsageError("--scenario is required (--list-scenarios names those that are built in)");
   }
-  if (!options.vessels.empty())
+  const std::string model = ofPatient && options.vessels.empty()
+    ? NameOfSeries(options.patient) + "-coronary"
+    : options.vessels;
+  if (!model.empty())
   {
     if (scenario.vessels.kind == VesselSource::Kind::Phantom)
     {
       scenario.vessels.motion = VesselMotion::Automatic;
     }
     scenario.vessels.kind = VesselSource::Kind::Run;
-    scenario.vessels.path = fs::absolute(options.vessels).lexically_normal().string();
+    scenario.vessels.path = fs::absolute(model).lexically_normal().string();
+  }
+  if (ofPatient)
+  {
+    scenario.name = options.scenario.empty() ? NameOfSeries(options.patient) : scenario.name;
+    scenario.imaging.background = fs::absolute(options.patient).lexically_normal().string();
+    scenario.imaging.backgroundRun = scenario.vessels.path;
   }
   if (scenario.vessels.kind == VesselSource::Kind::Run && scenario.vessels.path.empty())
   {
@@ -642,6 +653,17 @@ WorldProgress ShownBy(ProgressDisplay& progress)
 }
 }
 
+SessionWorld WorldOf(const HeadlessOptions& options, const Scenario& scenario, bool background,
+  const WorldProgress& progress)
+{
+  if (!options.patient.empty())
+  {
+    MakePatientModel(options.patient, scenario.vessels.path,
+      [&progress](double fraction) { return progress("model", fraction); });
+  }
+  return LoadWorld(scenario, background, progress);
+}
+
 void RunHeadless(const HeadlessOptions& options)
 {
   const Scenario scenario = ScenarioOf(options);
@@ -656,9 +678,9 @@ void RunHeadless(const HeadlessOptions& options)
     throw UsageError(
       "--ticks is required where neither --script nor --replay says how long it takes");
   }
-  const int preparations = options.xray ? 2 : 1;
+  const int preparations = 1 + (options.xray ? 1 : 0) + (options.patient.empty() ? 0 : 1);
   auto progress = std::make_unique<ProgressDisplay>("step", preparations + 1, options.quiet);
-  const SessionWorld world = LoadWorld(scenario, options.xray, ShownBy(*progress));
+  const SessionWorld world = WorldOf(options, scenario, options.xray, ShownBy(*progress));
   if (replay)
   {
     CheckRecording(options.replay, scenario, world.wallHash, !options.verify);

@@ -1,13 +1,12 @@
 #include "BackgroundVolume.h"
 
-#include "DicomSeries.h"
+#include "GatedSeries.h"
 #include "VolumeFile.h"
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
-#include <memory>
 #include <stdexcept>
 
 namespace coronary
@@ -27,23 +26,21 @@ constexpr double MostOutside = 0.02; ///< share of voxels above 4000, which no s
   throw std::runtime_error("'" + path + "' can not be a background: " + why);
 }
 
-std::unique_ptr<VolumeSource> Open(const std::string& path, const ProgressCallback& progress)
+GatedSeries Open(
+  const std::string& path, const BackgroundOptions& options, const ProgressCallback& progress)
 {
   std::error_code error;
-  if (std::filesystem::is_directory(path, error))
-  {
-    return OpenDicomSeries(path, {}, [&progress] { Report(progress, 0.0); });
-  }
   if (!std::filesystem::exists(path, error))
   {
     throw std::runtime_error("'" + path + "' is not there");
   }
-  if (!IsVolumeFileName(path))
+  const bool described = options.time && std::filesystem::path(path).extension() == ".json";
+  if (!std::filesystem::is_directory(path, error) && !IsVolumeFileName(path) && !described)
   {
     Refuse(path,
       "it is no .mha, .mhd, .nrrd, .nhdr, .nii or .nii.gz file, and no folder of DICOM files");
   }
-  return OpenVolumeFile(path);
+  return GatedSeries({ path }, {}, [&progress] { Report(progress, 0.0); });
 }
 
 std::array<std::int64_t, 3> Size(const ImageGrid& grid)
@@ -62,10 +59,6 @@ void RequireCt(const VolumeInfo& info, const std::string& path)
   if (!info.modality.empty() && info.modality != "CT")
   {
     Refuse(path, "its modality is " + info.modality + ", and only CT has Hounsfield units");
-  }
-  if (info.phases != 1)
-  {
-    Refuse(path, "it has " + std::to_string(info.phases) + " phases, and one volume is needed");
   }
   const std::array<std::int64_t, 3> size = Size(info.grid);
   for (std::size_t axis = 0; axis < 3; ++axis)
@@ -152,7 +145,8 @@ private:
 };
 
 /// A few slices at a time in single precision, so that values beyond short are seen.
-void ReadValues(VolumeSource& source, HounsfieldVolume& volume, const ProgressCallback& progress)
+void ReadValues(
+  VolumeSource& source, int phase, HounsfieldVolume& volume, const ProgressCallback& progress)
 {
   const std::array<std::int64_t, 3> size = Size(volume.grid);
   const std::int64_t slice = size[0] * size[1];
@@ -167,7 +161,7 @@ void ReadValues(VolumeSource& source, HounsfieldVolume& volume, const ProgressCa
     std::array<int, 6> extent = volume.grid.extent;
     extent[4] = static_cast<int>(first);
     extent[5] = static_cast<int>(last - 1);
-    source.Read(0, extent, values.data());
+    source.Read(phase, extent, values.data());
     for (std::int64_t i = 0; i < slice * (last - first); ++i)
     {
       const float value = values[static_cast<std::size_t>(i)];
@@ -182,19 +176,26 @@ void ReadValues(VolumeSource& source, HounsfieldVolume& volume, const ProgressCa
 }
 
 HounsfieldVolume ReadBackgroundVolume(
-  const std::string& path, const BackgroundPlacement& placement, const ProgressCallback& progress)
+  const std::string& path, const BackgroundOptions& options, const ProgressCallback& progress)
 {
-  if (!(placement.offset.cwiseAbs().maxCoeff() <= 1e5) || !placement.offset.allFinite())
+  if (!(options.offset.cwiseAbs().maxCoeff() <= 1e5) || !options.offset.allFinite())
   {
     throw std::invalid_argument("background: the offset has to be finite, at most 1e5 mm");
   }
-  const std::unique_ptr<VolumeSource> source = Open(path, progress);
-  RequireCt(source->Info(), path);
+  const GatedSeries series = Open(path, options, progress);
+  const int phase = options.time ? series.NearestPhase(*options.time) : 0;
+  VolumeSource& source = series.Source(phase);
+  RequireCt(source.Info(), path);
+  if (series.NumberOfPhases() != 1 && !options.time)
+  {
+    Refuse(path,
+      "it has " + std::to_string(series.NumberOfPhases()) + " phases, and one volume is needed");
+  }
   HounsfieldVolume volume;
-  volume.grid = source->Info().grid;
+  volume.grid = source.Info().grid;
   volume.values.resize(static_cast<std::size_t>(volume.View().NumberOfVoxels()));
-  ReadValues(*source, volume, progress);
-  volume.grid.origin += placement.offset;
+  ReadValues(source, series.IndexInSource(phase), volume, progress);
+  volume.grid.origin += options.offset;
   return volume;
 }
 }

@@ -317,6 +317,11 @@ ImagingSettings ImagingOf(const Json& object, const std::string& where, const st
   ImagingSettings imaging;
   JsonFields fields(object, where);
   imaging.background = FullPath(fields.Text("background", ""), folder);
+  imaging.backgroundRun = FullPath(fields.Text("background_run", ""), folder);
+  if (imaging.background.empty() && !imaging.backgroundRun.empty())
+  {
+    fields.Refuse("has a 'background_run' and no 'background'");
+  }
   if (fields.Has("background_offset_mm"))
   {
     imaging.backgroundOffset = PointOf(fields, "background_offset_mm");
@@ -356,7 +361,7 @@ ImagingSettings ImagingOf(const Json& object, const std::string& where, const st
 Json ImagingToJson(const ImagingSettings& imaging)
 {
   const auto list = [](const Vector3& point) { return Json{ point.x(), point.y(), point.z() }; };
-  Json json = { { "background", imaging.background },
+  Json json = { { "background", imaging.background }, { "background_run", imaging.backgroundRun },
     { "background_offset_mm", list(imaging.backgroundOffset) },
     { "thorax_seed", imaging.thoraxSeed }, { "primary_rad", imaging.pose.primary },
     { "secondary_rad", imaging.pose.secondary },

@@ -26,6 +26,8 @@ namespace coronary
 struct ImagingSettings
 {
   std::string background; ///< CT file or folder; empty: the thorax phantom about the heart
+  std::string
+    backgroundRun; ///< folder of the run that was made of that CT: it says which phase, and where the CT's contrast medium is
   Vector3 backgroundOffset{ Vector3::Zero() }; ///< mm that the CT is moved to fit the vessels
   std::uint64_t thoraxSeed = 1;                ///< of the thorax phantom
   CArmPose pose; ///< with the isocentre in the middle of the vessels, unless it is given

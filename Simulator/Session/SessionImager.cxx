@@ -2,9 +2,13 @@
 
 #include "BackgroundVolume.h"
 #include "Fnv1a.h"
+#include "MaskResampling.h"
 #include "PhantomMotion.h"
+#include "RunImages.h"
+#include "VolumeFile.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <limits>
 #include <stdexcept>
 
@@ -99,23 +103,85 @@ CArmPose StartPose(const WallTopology& topology, const ImagingSettings& imaging)
   return pose;
 }
 
-HounsfieldVolume LoadBackground(
+namespace
+{
+/// "12.3 mL" of so many voxels.
+std::string Millilitres(std::int64_t voxels, const ImageGrid& grid)
+{
+  char text[32];
+  std::snprintf(
+    text, sizeof(text), "%.1f mL", 1e-3 * static_cast<double>(voxels) * grid.spacing.prod());
+  return text;
+}
+
+/// The vessels' voxels of a run, on those of the CT.
+std::vector<unsigned char> VesselVoxels(
+  const std::string& path, const Vector3& offset, const ImageGrid& grid)
+{
+  const std::unique_ptr<VolumeSource> source = OpenVolumeFile(path);
+  ImageGrid own = source->Info().grid;
+  ScalarImage view;
+  view.grid = own;
+  std::vector<float> values(static_cast<std::size_t>(view.NumberOfVoxels()));
+  source->Read(0, own.extent, values.data());
+  std::vector<unsigned char> voxels(values.size());
+  std::transform(values.begin(), values.end(), voxels.begin(),
+    [](float value) { return static_cast<unsigned char>(value != 0.0F); });
+  own.origin += offset;
+  return ResampleMask(own, voxels, grid).voxels;
+}
+
+SessionBackground LoadPatient(const ImagingSettings& imaging, const ProgressCallback& progress)
+{
+  BackgroundOptions options;
+  options.offset = imaging.backgroundOffset;
+  RunImages run;
+  if (!imaging.backgroundRun.empty())
+  {
+    run = ReadRunImages(imaging.backgroundRun);
+    options.time = run.time;
+    for (Vector3& ostium : run.blood.ostia)
+    {
+      ostium += options.offset;
+    }
+  }
+  SessionBackground patient;
+  patient.volume = ReadBackgroundVolume(imaging.background, options, progress);
+  const ImageGrid& grid = patient.volume.grid;
+  if (const std::int64_t gone = RemoveSurroundings(patient.volume); gone > 0)
+  {
+    patient.notes.push_back(Millilitres(gone, grid) +
+      " of the CT lie apart in air, as a table does: they are left out of the X-ray images.");
+  }
+  if (!imaging.backgroundRun.empty())
+  {
+    const std::int64_t changed =
+      RemoveContrastMedium(patient.volume, run.blood, VesselVoxels(run.mask, options.offset, grid));
+    patient.notes.push_back("The CT's own contrast medium was taken out of " +
+      Millilitres(changed, grid) + " of heart and vessels.");
+  }
+  return patient;
+}
+}
+
+SessionBackground LoadBackground(
   const Scenario& scenario, const WallTopology& topology, const ProgressCallback& progress)
 {
   const ImagingSettings& imaging = scenario.imaging;
   if (!imaging.background.empty())
   {
-    return ReadBackgroundVolume(imaging.background, { imaging.backgroundOffset }, progress);
+    return LoadPatient(imaging, progress);
   }
   ThoraxSettings settings;
   settings.seed = imaging.thoraxSeed;
-  HounsfieldVolume thorax = MakeThoraxPhantom(settings, progress);
+  SessionBackground thorax;
+  thorax.volume = MakeThoraxPhantom(settings, progress);
   Vector3 offset = imaging.backgroundOffset;
   if (scenario.vessels.kind != VesselSource::Kind::Phantom)
   {
     offset += MiddleOfVessels(topology) - HeartFrame().ToWorld(HeartFrame::Centre);
   }
-  thorax.grid.origin += offset;
+  thorax.volume.grid.origin += offset;
   return thorax;
 }
 

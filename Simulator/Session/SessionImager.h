@@ -17,6 +17,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace coronary
@@ -28,12 +29,19 @@ Vector3 MiddleOfVessels(const WallTopology& topology);
 /// The scenario's pose, with an isocentre.
 CArmPose StartPose(const WallTopology& topology, const ImagingSettings& imaging);
 
+/// The patient around the vessels.
+struct SessionBackground
+{
+  HounsfieldVolume volume;
+  std::vector<std::string> notes; ///< what was taken away or stands in, a sentence each
+};
+
 /**
- * The patient around the vessels: the scenario's CT, or the thorax phantom. About vessels that are not the
- * coronary phantom's the thorax is moved so that its heart has their middle.
- * @throws as ReadBackgroundVolume, MakeThoraxPhantom
+ * The scenario's CT, of which what is not the patient is taken away and, with a run of it, the CT's contrast medium; or the
+ * thorax phantom. About vessels that are not the coronary phantom's the thorax is moved so that its heart has their middle.
+ * @throws as ReadBackgroundVolume, ReadRunImages, RemoveContrastMedium, MakeThoraxPhantom
  */
-HounsfieldVolume LoadBackground(
+SessionBackground LoadBackground(
   const Scenario& scenario, const WallTopology& topology, const ProgressCallback& progress = {});
 
 /// What SessionImager needs of it.

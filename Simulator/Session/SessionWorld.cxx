@@ -22,10 +22,12 @@ SessionWorld LoadWorld(const Scenario& scenario, bool background, const WorldPro
   };
   SessionWorld world;
   world.scenario = scenario;
+  std::vector<std::string> notes;
   const auto loadPatient = [&](const WallTopology& topology)
   {
-    world.background =
-      MakeProjector(LoadBackground(scenario, topology, step("patient")), scenario.imaging);
+    const SessionBackground made = LoadBackground(scenario, topology, step("patient"));
+    notes = made.notes;
+    world.background = MakeProjector(made.volume, scenario.imaging);
   };
   // A CT lies where it lies: what is wrong with it is told before the vessels are made, which takes longer.
   const bool hasImages = !scenario.imaging.background.empty();
@@ -48,6 +50,7 @@ SessionWorld LoadWorld(const Scenario& scenario, bool background, const WorldPro
   {
     loadPatient(topology);
   }
+  world.notes.insert(world.notes.end(), notes.begin(), notes.end());
   return world;
 }
 }

@@ -33,10 +33,11 @@ struct LoadingState
 
 QString SentenceOf(const std::string& what)
 {
-  return what == "vessels" ? "Loading the arteries and their motion ..."
-    : what == "patient"    ? "Making the patient around them ..."
-    : what == "anatomy"    ? "Drawing the anatomy ..."
-                           : "Starting ...";
+  return what == "model" ? "Finding the arteries and their motion in the images ..."
+    : what == "vessels"  ? "Loading the arteries and their motion ..."
+    : what == "patient"  ? "Making the patient around them ..."
+    : what == "anatomy"  ? "Drawing the anatomy ..."
+                         : "Starting ...";
 }
 }
 

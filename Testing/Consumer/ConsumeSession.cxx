@@ -60,7 +60,7 @@ int main(int argc, char** argv)
               << "; hand " << report.proximalForce << " N\n";
 
     const auto chest = coronary::MakeProjector(
-      coronary::LoadBackground(scenario, model.wall->Topology()), scenario.imaging);
+      coronary::LoadBackground(scenario, model.wall->Topology()).volume, scenario.imaging);
     coronary::SessionImager imager(model.wall->Topology(), scenario, chest, false);
     const coronary::GreyImage& image = imager.Expose(moment);
     std::cout << frames << " exposures; the last is an image of " << image.columns << " x "

@@ -283,6 +283,55 @@ TEST_F(TestCoronarySimulator, RefusesWrongImagesAndContrast)
   }
 }
 
+// The model of a patient's images: made where it is not there, kept where it is, never that of others.
+TEST_F(TestCoronarySimulator, APatientsImagesBecomeVesselsAndBackground)
+{
+  const auto pipeline = [this](const std::string& arguments)
+  {
+    const fs::path program =
+      fs::path(DYNAMICCORONARY_SIMULATOR).parent_path() / "coronary-pipeline";
+    return std::system(("cd '" + this->Folder.string() + "' && '" + program.string() + "' " +
+      arguments + " --quiet >stdout 2>stderr")
+                         .c_str());
+  };
+  ASSERT_EQ(pipeline("phantom --no-truth --fractions 0.75 --seed 1 --spacing 0.8 --output anna"), 0)
+    << this->Said();
+  ASSERT_EQ(
+    pipeline("run anna/series.json --motion none --until surface --output anna-coronary"), 0)
+    << this->Said();
+  const fs::path surface = this->Folder / "anna-coronary/surface.vtp";
+  const std::string before = ReadText(surface);
+  fs::remove(surface);
+  this->Put("look.json",
+    { { "format", "dynamiccoronary script" }, { "version", 1 },
+      { "pieces", { { { "seconds", 0.2 }, { "pedals", { "fluoroscopy" } } } } } });
+  const std::string session = "--headless --patient anna/series.json --xray --script look.json ";
+  ASSERT_EQ(this->Run(session + "--output a"), 0) << this->Said();
+  EXPECT_NE(this->Said().find("step 1 of 4 (model)"), std::string::npos) << this->Said();
+  EXPECT_NE(this->Said().find("contrast medium was taken out of"), std::string::npos)
+    << this->Said();
+  EXPECT_EQ(ReadText(surface), before) << "made again, with the settings of before";
+  EXPECT_TRUE(fs::exists(this->Folder / "a/xray_00000.png"));
+  EXPECT_EQ(this->Statistics("a")["scenario"], "anna");
+
+  // The next start finds it, here in a folder that is named.
+  const auto made = fs::last_write_time(surface);
+  ASSERT_EQ(this->Run(session + "--vessels anna-coronary --output b"), 0) << this->Said();
+  EXPECT_EQ(fs::last_write_time(surface), made);
+  EXPECT_EQ(this->Statistics("a")["last_state_hash"], this->Statistics("b")["last_state_hash"]);
+
+  fs::create_directories(this->Folder / "berta");
+  fs::copy(this->Folder / "anna", this->Folder / "berta", fs::copy_options::recursive);
+  this->ExpectFailure(1, "--patient berta/series.json --vessels anna-coronary --ticks 9",
+    "is not the model of 'berta/series.json'");
+  EXPECT_EQ(fs::last_write_time(surface), made);
+  this->ExpectFailure(1, "--patient nobody --ticks 9", "'nobody' is not there");
+  std::ofstream(this->Folder / "clara.nii") << "hello";
+  this->ExpectFailure(1, "--patient clara.nii --ticks 9", "is not a NIfTI file");
+  EXPECT_FALSE(fs::exists(this->Folder / "clara-coronary"));
+  this->ExpectFailure(2, "--patient anna --replay a.pcirec", "--patient");
+}
+
 // forces.csv of a wire that the artery holds (wall_friction_factor 6) and that is pulled out through a JL4 guide.
 TEST_F(TestCoronarySimulator, AScriptedWithdrawalResistsThePullAndTheGuideAddsToIt)
 {
@@ -451,7 +500,8 @@ TEST_F(TestCoronarySimulator, NamesTheProgramForPosing)
 TEST_F(TestCoronarySimulator, PrintsWhatItKnows)
 {
   ASSERT_EQ(this->Run("--list-scenarios"), 0);
-  for (const char* name : { "phantom-lca", "phantom-rca", "hra-lca", "lad-lesion", "lad-stent" })
+  for (const char* name : { "phantom-lca", "phantom-rca", "hra-lca", "lad-lesion", "lad-stent",
+         "patient-lca", "patient-rca" })
   {
     EXPECT_NE(ReadText(this->Folder / "stdout").find(name), std::string::npos);
   }

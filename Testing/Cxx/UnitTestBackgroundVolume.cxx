@@ -85,7 +85,7 @@ TEST(BackgroundVolume, readsAMetaImageAndPlacesIt)
 {
   const formattest::TemporaryFolder folder;
   const std::vector<short> values = Chest();
-  BackgroundPlacement placement;
+  BackgroundOptions placement;
   placement.offset = Vector3(1.0, -2.0, 3.5);
   const HounsfieldVolume volume = ReadBackgroundVolume(Write(folder, Grid(), values), placement);
   EXPECT_EQ(volume.values, values);
@@ -184,11 +184,30 @@ TEST(BackgroundVolume, doesNotAllocateWhatAHeaderPromises)
   ExpectFailure(folder / "huge.mha", "huge.mha");
 }
 
+TEST(BackgroundVolume, readsThePhaseNearestToATime)
+{
+  const formattest::TemporaryFolder folder;
+  std::vector<short> values = Chest();
+  const std::vector<short> early = values;
+  WriteMetaImage(folder / "early.mha", Grid(), values.data(), false);
+  values[0] = -900;
+  WriteMetaImage(folder / "late.mha", Grid(), values.data(), false);
+  const std::string path = folder / "series.json";
+  formattest::WriteText(path,
+    R"({"cycle_ms":800,"phases":[{"fraction":0.3,"image":"early.mha"},{"fraction":0.7,"image":"late.mha"}]})");
+  BackgroundOptions options;
+  options.time = 0.72;
+  EXPECT_EQ(ReadBackgroundVolume(path, options).values, values);
+  options.time = 0.1;
+  EXPECT_EQ(ReadBackgroundVolume(path, options).values, early);
+  ExpectFailure(path, "no folder of DICOM files"); // without a time it has to be one volume
+}
+
 TEST(BackgroundVolume, refusesPlacementsThatAreNone)
 {
   const formattest::TemporaryFolder folder;
   const std::string path = Write(folder, Grid(), Chest());
-  BackgroundPlacement placement;
+  BackgroundOptions placement;
   placement.offset.x() = std::numeric_limits<double>::quiet_NaN();
   ExpectRefusal([&] { ReadBackgroundVolume(path, placement); }, "offset");
   EXPECT_THROW(ReadBackgroundVolume(path, {}, [](double) { return false; }), Cancelled);

@@ -68,7 +68,7 @@ public:
 TEST(UnitTestScenario, BuiltInOnesAreGood)
 {
   const auto list = coronary::BuiltInScenarios();
-  ASSERT_EQ(list.size(), 5U);
+  ASSERT_EQ(list.size(), 7U);
   for (const auto& one : list)
   {
     const Scenario scenario = LoadScenario(one.name);
@@ -83,6 +83,8 @@ TEST(UnitTestScenario, BuiltInOnesAreGood)
   EXPECT_TRUE(atlas.vessels.path.empty());
   EXPECT_EQ(atlas.vessels.motion, coronary::VesselMotion::Contraction);
   EXPECT_FALSE(atlas.balloon);
+  EXPECT_EQ(LoadScenario("patient-lca").vessels.motion, coronary::VesselMotion::Automatic);
+  EXPECT_EQ(LoadScenario("patient-rca").artery, "RCA");
   const Scenario lesion = LoadScenario("lad-lesion");
   ASSERT_TRUE(lesion.balloon);
   EXPECT_NO_THROW(lesion.balloon->Validate());
@@ -160,12 +162,12 @@ TEST(UnitTestScenario, EverySettingArrives)
 TEST(UnitTestScenario, ImagingAndContrastArriveAndComeBackToTheBit)
 {
   json text = json::parse(ScenarioText(LoadScenario("phantom-lca")));
-  text["imaging"] = { { "background", "ct/a.nii" }, { "background_offset_mm", { 1, -2.5, 0.1 } },
-    { "thorax_seed", 5 }, { "primary_deg", -31.7 }, { "secondary_deg", 19.3 },
-    { "source_to_isocentre_mm", 712.3 }, { "source_to_detector_mm", 1043.7 },
-    { "isocentre_mm", { 0.1, 0.2, 0.3 } }, { "field_of_view_mm", 171.1 }, { "columns", 321 },
-    { "energy_keV", 61.9 }, { "iodine_mg_mL", 300.3 }, { "frame_rate_hz", 7.5 },
-    { "cine_rate_hz", 30 } };
+  text["imaging"] = { { "background", "ct/a.nii" }, { "background_run", "ct/model" },
+    { "background_offset_mm", { 1, -2.5, 0.1 } }, { "thorax_seed", 5 }, { "primary_deg", -31.7 },
+    { "secondary_deg", 19.3 }, { "source_to_isocentre_mm", 712.3 },
+    { "source_to_detector_mm", 1043.7 }, { "isocentre_mm", { 0.1, 0.2, 0.3 } },
+    { "field_of_view_mm", 171.1 }, { "columns", 321 }, { "energy_keV", 61.9 },
+    { "iodine_mg_mL", 300.3 }, { "frame_rate_hz", 7.5 }, { "cine_rate_hz", 30 } };
   text["contrast"] = { { "viscosity_mPa_s", 3.3 }, { "systolic_pressure_mmHg", 141.7 },
     { "diastolic_pressure_mmHg", 77.7 }, { "left_axial_speed_cm_s", 17.3 },
     { "right_axial_speed_cm_s", 13.1 }, { "left_diastolic_ratio", 1.9 },
@@ -175,6 +177,7 @@ TEST(UnitTestScenario, ImagingAndContrastArriveAndComeBackToTheBit)
   const Scenario s = ScenarioFromText(text.dump(), "'own.json'", "/folder");
   const coronary::ImagingSettings& imaging = s.imaging;
   EXPECT_EQ(imaging.background, "/folder/ct/a.nii");
+  EXPECT_EQ(imaging.backgroundRun, "/folder/ct/model");
   EXPECT_EQ(imaging.backgroundOffset, Vector3(1.0, -2.5, 0.1));
   EXPECT_EQ(imaging.thoraxSeed, 5U);
   EXPECT_NEAR(imaging.pose.primary, -31.7 * M_PI / 180.0, 1e-15);
@@ -206,6 +209,7 @@ TEST(UnitTestScenario, ImagingAndContrastArriveAndComeBackToTheBit)
   const Scenario again = ScenarioFromText(ScenarioText(s), "'text'", "/elsewhere");
   EXPECT_EQ(ScenarioText(again), ScenarioText(s));
   EXPECT_EQ(again.imaging.background, imaging.background);
+  EXPECT_EQ(again.imaging.backgroundRun, imaging.backgroundRun);
   EXPECT_EQ(again.imaging.pose.primary, imaging.pose.primary);
   EXPECT_EQ(again.imaging.pose.secondary, imaging.pose.secondary);
   EXPECT_EQ(again.imaging.pose.isocentre, imaging.pose.isocentre);
@@ -232,6 +236,7 @@ TEST(UnitTestScenario, RefusesWrongImagingAndContrast)
     },
     "'source_to_detector_mm'");
   Refused([](json& s) { s["imaging"]["background"] = 7; }, "'background'");
+  Refused([](json& s) { s["imaging"]["background_run"] = "model"; }, "no 'background'");
   Refused([](json& s) { s["imaging"] = json::array(); }, "'imaging'");
   Refused([](json& s) { s["contrast"]["colour"] = "red"; }, "contrast has 'colour'");
   Refused([](json& s) { s["contrast"]["tracers"] = 5; }, "'tracers'");

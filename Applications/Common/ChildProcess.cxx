@@ -1,7 +1,5 @@
 #include "ChildProcess.h"
 
-#include "Ranks.h"
-
 #include <cerrno>
 #include <csignal>
 #include <cstring>
@@ -16,6 +14,10 @@ namespace coronary
 {
 namespace
 {
+/// A child would take itself for a rank by what begins so.
+constexpr const char* RankVariables[] = { "OMPI_", "PMIX_", "PMI_", "MPI_LOCALNRANKS",
+  "MPI_LOCALRANKID", "MV2_COMM_WORLD_", "PRTE_", "ORTE_" };
+
 /// The environment without what tells of ranks.
 std::vector<char*> OwnEnvironment()
 {
@@ -23,9 +25,9 @@ std::vector<char*> OwnEnvironment()
   for (char** variable = environ; *variable != nullptr; ++variable)
   {
     bool ofRanks = false;
-    for (const std::string& name : RankVariables())
+    for (const char* name : RankVariables)
     {
-      ofRanks = ofRanks || std::strncmp(*variable, name.c_str(), name.size()) == 0;
+      ofRanks = ofRanks || std::strncmp(*variable, name, std::strlen(name)) == 0;
     }
     if (!ofRanks)
     {
@@ -37,7 +39,8 @@ std::vector<char*> OwnEnvironment()
 }
 }
 
-ChildProcess::ChildProcess(const std::vector<std::string>& arguments, const std::string& log)
+ChildProcess::ChildProcess(const std::string& program, const std::vector<std::string>& arguments,
+  const std::string& log, bool progress)
 {
   const int output = open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
   if (output < 0)
@@ -55,6 +58,11 @@ ChildProcess::ChildProcess(const std::vector<std::string>& arguments, const std:
   }
   argv.push_back(nullptr);
   std::vector<char*> environment = OwnEnvironment();
+  char wish[] = "DYNAMICCORONARY_PROGRESS=1"; // see ProgressDisplay
+  if (progress)
+  {
+    environment.insert(environment.begin(), wish);
+  }
   const pid_t parent = getpid();
   const pid_t child = fork();
   if (child == 0)
@@ -76,7 +84,7 @@ ChildProcess::ChildProcess(const std::vector<std::string>& arguments, const std:
     }
     signal(SIGINT, SIG_DFL);
     signal(SIGTERM, SIG_DFL);
-    execve("/proc/self/exe", argv.data(), environment.data());
+    execve(program.c_str(), argv.data(), environment.data());
     _exit(127);
   }
   const int reason = errno;
