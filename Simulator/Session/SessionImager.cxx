@@ -151,7 +151,9 @@ SessionBackground LoadPatient(const ImagingSettings& imaging, const ProgressCall
   if (const std::int64_t gone = RemoveSurroundings(patient.volume); gone > 0)
   {
     patient.notes.push_back(Millilitres(gone, grid) +
-      " of the CT lie apart in air, as a table does: they are left out of the X-ray images.");
+      " of the CT are thin and lie in air or behind the back, as a table does: they are left out "
+      "of "
+      "the X-ray images.");
   }
   if (!imaging.backgroundRun.empty())
   {

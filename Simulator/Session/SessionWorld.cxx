@@ -6,6 +6,8 @@
 #include "VesselLesions.h"
 #include "VesselModel.h"
 
+#include <exception>
+
 namespace coronary
 {
 SessionWorld LoadWorld(const Scenario& scenario, bool background, const WorldProgress& progress)
@@ -23,17 +25,34 @@ SessionWorld LoadWorld(const Scenario& scenario, bool background, const WorldPro
   SessionWorld world;
   world.scenario = scenario;
   std::vector<std::string> notes;
-  const auto loadPatient = [&](const WallTopology& topology)
+  const auto loadPatient = [&](const Scenario& wanted, const WallTopology& topology)
   {
-    const SessionBackground made = LoadBackground(scenario, topology, step("patient"));
-    notes = made.notes;
-    world.background = MakeProjector(made.volume, scenario.imaging);
+    const SessionBackground made = LoadBackground(wanted, topology, step("patient"));
+    notes.insert(notes.end(), made.notes.begin(), made.notes.end());
+    world.background = MakeProjector(made.volume, wanted.imaging);
   };
   // A CT lies where it lies: what is wrong with it is told before the vessels are made, which takes longer.
-  const bool hasImages = !scenario.imaging.background.empty();
-  if (background && hasImages)
+  Scenario withThorax = scenario;
+  withThorax.imaging.background.clear();
+  if (background && !scenario.imaging.background.empty())
   {
-    loadPatient({});
+    try
+    {
+      loadPatient(scenario, {});
+    }
+    catch (const Cancelled&)
+    {
+      throw;
+    }
+    catch (const std::exception& error)
+    {
+      // Who asked for vessels and background of one patient can go on with the vessels.
+      if (scenario.imaging.backgroundRun.empty())
+      {
+        throw;
+      }
+      notes.push_back(std::string(error.what()) + "; a made-up chest stands in for it.");
+    }
   }
   VesselModel model = LoadVessels(scenario.vessels, step("vessels"));
   world.wall = scenario.lesions.empty()
@@ -46,9 +65,9 @@ SessionWorld LoadWorld(const Scenario& scenario, bool background, const WorldPro
   world.wallHash = WallHash(*world.wall);
   const WallTopology& topology = world.wall->Topology();
   world.scenario.imaging.pose = StartPose(topology, scenario.imaging);
-  if (background && !hasImages)
+  if (background && !world.background)
   {
-    loadPatient(topology);
+    loadPatient(withThorax, topology);
   }
   world.notes.insert(world.notes.end(), notes.begin(), notes.end());
   return world;

@@ -320,6 +320,17 @@ TEST_F(TestCoronarySimulator, APatientsImagesBecomeVesselsAndBackground)
   EXPECT_EQ(fs::last_write_time(surface), made);
   EXPECT_EQ(this->Statistics("a")["last_state_hash"], this->Statistics("b")["last_state_hash"]);
 
+  // Images that are no background: the vessels are there all the same.
+  ASSERT_EQ(this->Run("--headless --patient anna/series.json --print-scenario"), 0);
+  json scenario = json::parse(ReadText(this->Folder / "stdout"));
+  scenario["imaging"]["background"] = "nobody.nii";
+  this->Put("else.json", scenario);
+  ASSERT_EQ(this->Run("--headless --scenario else.json --xray --script look.json --output c"), 0)
+    << this->Said();
+  EXPECT_NE(this->Said().find("is not there; a made-up chest stands in"), std::string::npos)
+    << this->Said();
+  EXPECT_TRUE(fs::exists(this->Folder / "c/xray_00000.png"));
+
   fs::create_directories(this->Folder / "berta");
   fs::copy(this->Folder / "anna", this->Folder / "berta", fs::copy_options::recursive);
   this->ExpectFailure(1, "--patient berta/series.json --vessels anna-coronary --ticks 9",
