@@ -3,6 +3,7 @@
 #include "AtomicFile.h"
 #include "BoundedJson.h"
 #include "ChildProcess.h"
+#include "StagedFolder.h"
 #include "TextFile.h"
 
 #include <algorithm>
@@ -26,34 +27,6 @@ constexpr char Program[] = "coronary-pipeline";
 constexpr auto Pause = std::chrono::milliseconds(100);
 constexpr auto Patience = std::chrono::seconds(10); // for it to stop
 
-/// Files of this process, gone with it.
-class ScratchFolder
-{
-public:
-  ScratchFolder()
-  {
-    std::string name = (fs::temp_directory_path() / "coronary-patient-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr)
-    {
-      throw std::runtime_error(
-        "No folder can be made in '" + fs::temp_directory_path().string() + "'.");
-    }
-    this->Path = name;
-  }
-  ~ScratchFolder()
-  {
-    std::error_code ignored;
-    fs::remove_all(this->Path, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-
-  std::string operator/(const char* name) const { return (this->Path / name).string(); }
-
-private:
-  fs::path Path;
-};
-
 /// Whether a path of a report, which may be told from another folder, leads to `series`.
 bool LeadsTo(const std::string& path, const std::string& series)
 {
@@ -69,19 +42,33 @@ bool LeadsTo(const std::string& path, const std::string& series)
   return told.size() <= given.size() && std::equal(told.rbegin(), told.rend(), given.rbegin());
 }
 
+/// What a run tells of itself; null: there is none.
+Json ReportIn(const std::string& folder)
+{
+  const std::string file = (fs::path(folder) / "report.json").string();
+  std::error_code ignored;
+  return fs::exists(file, ignored)
+    ? ParseBoundedJson(ReadTextFile(file, "a report"), "'" + file + "'")
+    : Json();
+}
+
+/// A member of an object; null: there is none.
+Json Member(const Json& json, const char* name)
+{
+  return json.is_object() ? json.value(name, Json()) : Json();
+}
+
 /// The settings of a model that is there, or was begun; null: there is none.
 /// @throws std::runtime_error  it is of other images
 Json SettingsOf(const std::string& folder, const std::string& series)
 {
-  const std::string file = (fs::path(folder) / "report.json").string();
-  std::error_code ignored;
-  if (!fs::exists(file, ignored))
+  const Json report = ReportIn(folder);
+  if (report.is_null())
   {
     return {};
   }
-  const Json report = ParseBoundedJson(ReadTextFile(file, "a report"), "'" + file + "'");
-  const Json settings = report.is_object() ? report.value("settings", Json()) : Json();
-  const Json input = settings.is_object() ? settings.value("input", Json()) : Json();
+  const Json settings = Member(report, "settings");
+  const Json input = Member(settings, "input");
   if (!input.is_array() || input.size() != 1 || !input[0].is_string() ||
     !LeadsTo(input[0].get<std::string>(), series))
   {
@@ -90,6 +77,20 @@ Json SettingsOf(const std::string& folder, const std::string& series)
       ": name another folder with --vessels.");
   }
   return settings;
+}
+
+/// What the run warned of, in the order of its stages.
+std::vector<std::string> WarningsIn(const std::string& folder)
+{
+  std::vector<std::string> warnings;
+  for (const Json& stage : Member(ReportIn(folder), "stages"))
+  {
+    for (const Json& warning : Member(stage, "warnings"))
+    {
+      warnings.push_back(warning.is_string() ? warning.get<std::string>() : warning.dump());
+    }
+  }
+  return warnings;
 }
 
 /// What of the child's words is new: how far it is, and the last line that is about something else.
@@ -157,7 +158,7 @@ std::string NameOfSeries(const std::string& series)
   return (path.filename() == "series.json" ? path.parent_path().filename() : path.stem()).string();
 }
 
-void MakePatientModel(
+std::vector<std::string> MakePatientModel(
   const std::string& series, const std::string& folder, const ProgressCallback& progress)
 {
   std::error_code error;
@@ -171,16 +172,17 @@ void MakePatientModel(
     throw std::runtime_error(
       "There is no '" + program.string() + "' to make the model of '" + series + "'.");
   }
-  const ScratchFolder scratch;
+  // Nothing of it is committed.
+  StagedFolder scratch(fs::temp_directory_path().string());
   std::vector<std::string> arguments = { "run", fs::absolute(series).string(), "--output", folder,
     "--resume" };
   if (const Json settings = SettingsOf(folder, series); !settings.is_null())
   {
-    const std::string file = scratch / "settings.json";
+    const std::string file = scratch.Add("settings.json");
     WriteFileAtomically(file, settings.dump());
     arguments.insert(arguments.end(), { "--settings", file });
   }
-  const std::string log = scratch / "log";
+  const std::string log = scratch.Add("log");
   ChildProcess process(program.string(), arguments, log, true);
   Listener listener(log);
   while (!process.HasEnded())
@@ -203,5 +205,6 @@ void MakePatientModel(
     throw std::runtime_error("The model of '" + series + "' could not be made: " +
       (listener.said.empty() ? std::string(Program) + " ended without a word." : listener.said));
   }
+  return WarningsIn(folder);
 }
 }

@@ -8,6 +8,7 @@
 #include "ParallelFor.h"
 
 #include <string>
+#include <vector>
 
 namespace coronary
 {
@@ -20,10 +21,11 @@ std::string NameOfSeries(const std::string& series);
  * @param series    what that program takes: a folder of DICOM files, a series.json, a volume
  * @param folder    of the model
  * @param progress  0 to 1; false cancels
+ * @return what the run warned of: what was not found, guessed or doubted, by name and place
  * @throws std::runtime_error in one sentence: nothing at `series`; a model of other images in `folder`; no coronary-pipeline; why it failed, in its own words
  * @throws Cancelled
  */
-void MakePatientModel(
+std::vector<std::string> MakePatientModel(
   const std::string& series, const std::string& folder, const ProgressCallback& progress = {});
 }
 

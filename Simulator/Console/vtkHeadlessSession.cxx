@@ -656,12 +656,15 @@ WorldProgress ShownBy(ProgressDisplay& progress)
 SessionWorld WorldOf(const HeadlessOptions& options, const Scenario& scenario, bool background,
   const WorldProgress& progress)
 {
+  std::vector<std::string> warnings;
   if (!options.patient.empty())
   {
-    MakePatientModel(options.patient, scenario.vessels.path,
+    warnings = MakePatientModel(options.patient, scenario.vessels.path,
       [&progress](double fraction) { return progress("model", fraction); });
   }
-  return LoadWorld(scenario, background, progress);
+  SessionWorld world = LoadWorld(scenario, background, progress);
+  world.notes.insert(world.notes.begin(), warnings.begin(), warnings.end());
+  return world;
 }
 
 void RunHeadless(const HeadlessOptions& options)
