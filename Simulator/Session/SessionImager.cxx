@@ -8,6 +8,7 @@
 #include "VolumeFile.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <limits>
 #include <stdexcept>
@@ -122,11 +123,23 @@ std::vector<unsigned char> VesselVoxels(
   ImageGrid own = source->Info().grid;
   ScalarImage view;
   view.grid = own;
-  std::vector<float> values(static_cast<std::size_t>(view.NumberOfVoxels()));
-  source->Read(0, own.extent, values.data());
-  std::vector<unsigned char> voxels(values.size());
-  std::transform(values.begin(), values.end(), voxels.begin(),
-    [](float value) { return static_cast<unsigned char>(value != 0.0F); });
+  std::vector<unsigned char> voxels(static_cast<std::size_t>(view.NumberOfVoxels()));
+  // Some slices at a time: the whole as numbers would take four times as much memory.
+  constexpr int Step = 16;
+  const std::array<int, 3> size = view.Dimensions();
+  const std::size_t slice = static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]);
+  std::vector<float> values(slice * Step);
+  auto out = voxels.begin();
+  for (int first = own.extent[4]; first <= own.extent[5]; first += Step)
+  {
+    std::array<int, 6> extent = own.extent;
+    extent[4] = first;
+    extent[5] = std::min(first + Step - 1, own.extent[5]);
+    source->Read(0, extent, values.data());
+    const auto end = values.begin() + static_cast<std::ptrdiff_t>(slice) * (extent[5] - first + 1);
+    out = std::transform(values.begin(), end, out,
+      [](float value) { return static_cast<unsigned char>(value != 0.0F); });
+  }
   own.origin += offset;
   return ResampleMask(own, voxels, grid).voxels;
 }
@@ -148,7 +161,9 @@ SessionBackground LoadPatient(const ImagingSettings& imaging, const ProgressCall
   SessionBackground patient;
   patient.volume = ReadBackgroundVolume(imaging.background, options, progress);
   const ImageGrid& grid = patient.volume.grid;
-  if (const std::int64_t gone = RemoveSurroundings(patient.volume); gone > 0)
+  // The reading was nearly all of it; what follows can be cancelled, too.
+  const ProgressCallback poll = [&progress](double) { return !progress || progress(1.0); };
+  if (const std::int64_t gone = RemoveSurroundings(patient.volume, poll); gone > 0)
   {
     patient.notes.push_back(Millilitres(gone, grid) +
       " of the CT are thin and lie in air or behind the back, as a table does: they are left out "
@@ -157,8 +172,8 @@ SessionBackground LoadPatient(const ImagingSettings& imaging, const ProgressCall
   }
   if (!imaging.backgroundRun.empty())
   {
-    const std::int64_t changed =
-      RemoveContrastMedium(patient.volume, run.blood, VesselVoxels(run.mask, options.offset, grid));
+    const std::int64_t changed = RemoveContrastMedium(
+      patient.volume, run.blood, VesselVoxels(run.mask, options.offset, grid), poll);
     patient.notes.push_back("The CT's own contrast medium was taken out of " +
       Millilitres(changed, grid) + " of heart and vessels.");
   }
