@@ -33,8 +33,8 @@ struct FoamCase
   std::string inlet = "inlet";
   std::vector<FoamOutlet> outlets;
 
-  double cycle = 1.0; ///< s
-  int cycles = 1;
+  double cycle = 1.0;  ///< s
+  double cycles = 1.0; ///< at least 1, in whole pictures; what is before the last one is start-up
   int stepsPerCycle = 1000;
   int picturesPerCycle = 20; ///< time directories
   bool steady = false;       ///< simpleFoam, with the mean inflow

@@ -245,8 +245,10 @@ void SequenceJob::DeclareFlow(CLI::App& app)
     ->group(group);
   app.add_flag("--flow-rest", this->flow.rest, "The walls stand still, as they are at time 0")
     ->group(group);
-  app.add_option("--flow-cycles", this->flow.cycles, "Cycles to simulate; the last one counts")
-    ->check(WholeWithin(1, 100))
+  app
+    .add_option("--flow-cycles", this->flow.cycles,
+      "Cycles to simulate, in 20ths; the last one counts, what is before it is start-up")
+    ->check(Within(1.0, 100.0))
     ->type_name("N")
     ->capture_default_str()
     ->group(group);

@@ -28,11 +28,11 @@ struct FlowCaseSettings
   double extension = 1.0; ///< of each end, in its diameters
   double meanFlow = 0.0;  ///< mL/s into a tree; 0: from the inlet's section
   BloodModel blood = BloodModel::Newtonian;
-  bool rest = false; ///< walls that stand still, at time 0
-  int cycles = 3;
-  int steps = 1000;   ///< a cycle
-  int frames = 100;   ///< of the motion a cycle
-  double cycle = 1.0; ///< s
+  bool rest = false;   ///< walls that stand still, at time 0
+  double cycles = 3.0; ///< see FoamCase
+  int steps = 1000;    ///< a cycle
+  int frames = 100;    ///< of the motion a cycle
+  double cycle = 1.0;  ///< s
 };
 
 /// What a run has left, and what moves it.

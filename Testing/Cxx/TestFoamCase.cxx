@@ -17,12 +17,14 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <map>
 #include <unistd.h>
+#include <vector>
 
 namespace fs = std::filesystem;
 
@@ -150,6 +152,62 @@ TEST_F(FoamCases, OpenFoamsCheckFindsNothing)
   EXPECT_NEAR(1e9 * number("Total volume = "), quality.totalVolume, 1e-6 * quality.totalVolume);
 }
 
+TEST_F(FoamCases, AStoppedCaseWithMovingWallsGoesOn)
+{
+  if (this->Run("command -v pimpleFoam") != 0)
+  {
+    GTEST_SKIP() << "OpenFOAM is not installed";
+  }
+  // The fork sways by 0.4 mm in the time of a picture, twenty steps.
+  for (const double time : { 0.0, 0.02, 0.04 })
+  {
+    std::vector<coronary::Vector3> moved = this->Mesh.points;
+    for (coronary::Vector3& point : moved)
+    {
+      point.x() += 20.0 * time * point.z() / 24.0;
+    }
+    for (const auto& [name, text] :
+      coronary::FoamMotionFrame(this->Mesh.cells, this->Mesh.points, moved, time))
+    {
+      this->Put("constant/boundaryData/" + name, text);
+    }
+  }
+  const auto solve = [this](int steps)
+  {
+    return this->Run("sed -i -e 's/^endTime .*/endTime " + std::to_string(0.001 * steps) +
+      ";/' -e 's/^writeInterval .*/writeInterval 0.002;/' system/controlDict && sh Allrun");
+  };
+  // Row of a time in what is written of a patch, by the start that came last.
+  const auto row = [this](const std::string& what, const std::string& start)
+  {
+    const std::string text =
+      ReadText(this->Folder / "postProcessing" / what / start / "surfaceFieldValue.dat");
+    const std::size_t at = text.rfind('\t');
+    return at == std::string::npos ? std::nan("") : std::strtod(text.c_str() + at, nullptr);
+  };
+  const std::vector<std::string> ends{ "flow_outlet_dLAD", "flow_outlet_D1", "pressure_inlet",
+    "pressure_outlet_dLAD" };
+  ASSERT_EQ(solve(8), 0) << ReadText(this->Folder / "log.solver");
+  std::vector<double> whole;
+  for (const std::string& end : ends)
+  {
+    whole.push_back(row(end, "0"));
+  }
+  // As if it had been killed while it wrote the third picture.
+  fs::remove_all(this->Folder / "0.008");
+  fs::resize_file(this->Folder / "0.006" / "p", fs::file_size(this->Folder / "0.006" / "p") / 2);
+  ASSERT_EQ(solve(8), 0) << ReadText(this->Folder / "log.solver");
+  EXPECT_NE(
+    ReadText(this->Folder / "stderr").find("0.006 was not written to its end"), std::string::npos);
+  EXPECT_TRUE(fs::exists(this->Folder / "0.008" / "U"));
+  for (std::size_t k = 0; k < ends.size(); ++k)
+  {
+    EXPECT_NEAR(row(ends[k], "0.004"), whole[k], 1e-6 * std::abs(whole[k])) << ends[k];
+  }
+  // Stopped again before a picture is there.
+  ASSERT_EQ(solve(8), 0) << ReadText(this->Folder / "log.solver");
+}
+
 TEST_F(FoamCases, CasesThatMakeNoSenseAreRefused)
 {
   coronary::FoamCase flow;
@@ -157,6 +215,9 @@ TEST_F(FoamCases, CasesThatMakeNoSenseAreRefused)
   flow.outlets.push_back({ "outlet", 1.0, 0.0, 1.0 });
   ExpectRefusal([&] { coronary::FoamCaseFiles(flow); }, "outlet outlet");
   flow.outlets[0].distal = 1.0;
+  flow.cycles = 1.33;
+  ExpectRefusal([&] { coronary::FoamCaseFiles(flow); }, "whole parts of 20");
+  flow.cycles = 1.0;
   flow.cycle = 0.0;
   ExpectRefusal([&] { coronary::FoamCaseFiles(flow); }, "positive");
 }
