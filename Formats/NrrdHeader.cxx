@@ -85,7 +85,7 @@ Fields ParseFields(const std::string& text, const std::string& path)
   return fields;
 }
 
-VoxelType TypeOf(const std::string& name, const std::string& path)
+VoxelType NrrdTypeOf(const std::string& name, const std::string& path)
 {
   static const std::map<std::string, VoxelType> types = { { "signed char", VoxelType::Int8 },
     { "int8", VoxelType::Int8 }, { "int8_t", VoxelType::Int8 }, { "uchar", VoxelType::UInt8 },
@@ -466,7 +466,7 @@ VolumeHeader ReadNrrdHeader(const std::string& path)
   }
   info.phases = phaseAxis >= 0 ? size[phaseAxis] : 1;
   header.phasesFirst = phaseAxis == 0;
-  header.type = TypeOf(fields.Text("type"), path);
+  header.type = NrrdTypeOf(fields.Text("type"), path);
   SetGeometry(header, fields, { size[spatialAxes[0]], size[spatialAxes[1]], size[spatialAxes[2]] },
     spatialAxes, directions);
   SetData(header, fields);

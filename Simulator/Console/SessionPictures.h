@@ -38,6 +38,9 @@ public:
     const TrainingSession& session, const FolderCallback& folder, RecordingWriter* recording);
   void AddScene(const TrainingSession& session, const FolderCallback& folder);
 
+  /// Cine runs whose files are not written yet.
+  void Finish(const FolderCallback& folder);
+
   std::size_t Frames() const;
   const std::string& FrameTable() const; ///< CSV of the frames
 

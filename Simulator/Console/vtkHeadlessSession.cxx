@@ -38,12 +38,13 @@ constexpr std::int64_t InterruptionInterval = 64; // ticks between looks at sign
 constexpr std::uint64_t MostPrinted = 50; // messages on the console; statistics.json has more
 
 /// Whether it is a name as wire_00012.vtp.
-bool IsNumbered(const std::string& name, const std::string& start, const std::string& end)
+bool IsNumbered(const std::string& name, const std::string& start, const std::string& end,
+  const char* number = "0123456789")
 {
   const std::size_t digits = start.size();
   return name.size() > digits + end.size() && name.rfind(start, 0) == 0 &&
     name.compare(name.size() - end.size(), end.size(), end) == 0 &&
-    name.find_first_not_of("0123456789", digits) == name.size() - end.size();
+    name.find_first_not_of(number, digits) == name.size() - end.size();
 }
 
 /// Empty where the branch has no name.
@@ -220,8 +221,9 @@ public:
   /// For files that others write.
   std::string Place(const std::string& name) { return this->Folder->Add(name); }
 
-  void Finish(const Json& statistics, const SessionPictures& pictures, const std::string& stents)
+  void Finish(const Json& statistics, SessionPictures& pictures, const std::string& stents)
   {
+    pictures.Finish([this](const std::string& name) { return this->Place(name); });
     if (!stents.empty())
     {
       WriteFileAtomically(this->Folder->Add("stents.csv"), stents);
@@ -277,8 +279,9 @@ private:
     {
       const std::string name = entry.path().filename().string();
       if (IsNumbered(name, "wire_", ".vtp") || IsNumbered(name, "wall_", ".vtp") ||
-        IsNumbered(name, "xray_", ".png") || IsNumbered(name, "scene_", ".png") ||
-        name == "wall.pvd" || name == "frames.csv" || name == "balloon.csv" || name == "stents.csv")
+        IsNumbered(name, "xray_", ".png") || IsNumbered(name, "cine_", ".dcm", "0123456789_") ||
+        IsNumbered(name, "scene_", ".png") || name == "wall.pvd" || name == "frames.csv" ||
+        name == "balloon.csv" || name == "stents.csv")
       {
         older.push_back(name);
       }

@@ -1,5 +1,6 @@
 #include "SessionPictures.h"
 
+#include "CineRuns.h"
 #include "HeartShell.h"
 #include "Numbers.h"
 #include "SessionImager.h"
@@ -12,7 +13,9 @@
 
 #include <cstdio>
 #include <cstring>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 namespace coronary
 {
@@ -20,6 +23,8 @@ namespace
 {
 constexpr int SceneSize = 768;
 constexpr std::int64_t SceneTriangles = 40000; // there is no hurry
+/// Bytes of a file of images; a longer run has several. Twice as much is in memory while one is written.
+constexpr std::size_t CineFile = std::size_t(128) << 20;
 
 void WriteGrey(const GreyImage& image, const std::string& path)
 {
@@ -36,9 +41,11 @@ struct SessionPictures::Internals
   std::unique_ptr<SessionImager> Imager;
   std::unique_ptr<vtkSimulatorScene> Scene;
   std::unique_ptr<vtkScenePicture> Picture;
+  std::optional<CineRuns> Runs;
   SessionSnapshot Moment;
   std::size_t Frames = 0;
   std::size_t Scenes = 0;
+  void WriteRuns(bool all, const FolderCallback& folder);
   std::string Table = "file,tick,seconds,primary_deg,secondary_deg,phase,cine_run,photons,"
                       "air_kerma_mGy,contrast_mL,image_hash\n";
 };
@@ -51,6 +58,7 @@ SessionPictures::SessionPictures(const PictureOptions& options, const SessionWor
   {
     this->Data->Imager =
       std::make_unique<SessionImager>(world.wall->Topology(), scenario, world.background, false);
+    this->Data->Runs.emplace(scenario, "coronary-simulator " DYNAMICCORONARY_VERSION, 2 * CineFile);
   }
   if (options.scene)
   {
@@ -69,6 +77,23 @@ SessionPictures::SessionPictures(const PictureOptions& options, const SessionWor
 }
 
 SessionPictures::~SessionPictures() = default;
+
+void SessionPictures::Internals::WriteRuns(bool all, const FolderCallback& folder)
+{
+  for (XrayAngiogram& run : this->Runs->Take(all))
+  {
+    const std::string name = NameOfCineFile(run);
+    WriteXrayAngiogram(std::move(run), folder(name));
+  }
+}
+
+void SessionPictures::Finish(const FolderCallback& folder)
+{
+  if (this->Data->Runs)
+  {
+    this->Data->WriteRuns(true, folder);
+  }
+}
 
 void SessionPictures::AddFrame(
   const TrainingSession& session, const FolderCallback& folder, RecordingWriter* recording)
@@ -89,6 +114,8 @@ void SessionPictures::AddFrame(
   {
     return;
   }
+  data.Runs->Add(data.Moment, image, data.Imager->Images().Mode());
+  data.WriteRuns(data.Runs->Bytes() >= CineFile, folder);
   char name[48];
   std::snprintf(name, sizeof(name), "xray_%05zu.png", data.Frames);
   WriteGrey(image, folder(name));

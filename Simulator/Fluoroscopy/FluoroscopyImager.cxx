@@ -41,11 +41,6 @@ void SmoothInPlace(std::vector<float>& image, int columns, int rows)
     }
   }
 }
-
-std::size_t Bytes(const GreyImage& image)
-{
-  return image.values.size() + sizeof(GreyImage);
-}
 }
 
 void ImagerSettings::Validate() const
@@ -79,7 +74,6 @@ void FluoroscopyImager::SetSettings(const ImagerSettings& settings)
   settings.Validate();
   this->Settings_ = settings;
   this->Detector_.SetSettings(settings.detector);
-  this->KeepWithinMemory();
 }
 
 void FluoroscopyImager::TakeMask()
@@ -125,10 +119,6 @@ const GreyImage& FluoroscopyImager::Expose(const LineIntegrals& background,
   else
   {
     this->ShowSubtracted();
-  }
-  if (exposure.cine)
-  {
-    this->Store(exposure);
   }
   return this->Shown_;
 }
@@ -314,57 +304,5 @@ void FluoroscopyImager::AddRoadmap()
   {
     this->LogSignal[i] += this->Roadmap[i];
   }
-}
-
-void FluoroscopyImager::Store(const Exposure& exposure)
-{
-  if (this->Runs_.empty() || this->Runs_.back().number != exposure.run)
-  {
-    Run run;
-    run.number = exposure.run;
-    run.frameRate = exposure.frameRate;
-    this->Runs_.push_back(std::move(run));
-  }
-  this->Runs_.back().frames.push_back(this->Shown_);
-  this->Stored += Bytes(this->Shown_);
-  this->KeepWithinMemory();
-}
-
-/// The oldest frames go first; the newest one stays.
-void FluoroscopyImager::KeepWithinMemory()
-{
-  while (this->Stored > this->Settings_.cineMemory)
-  {
-    Run& oldest = this->Runs_.front();
-    if (this->Runs_.size() == 1 && oldest.frames.size() == 1)
-    {
-      return;
-    }
-    this->Stored -= Bytes(oldest.frames.front());
-    oldest.frames.pop_front();
-    ++oldest.dropped;
-    ++this->Dropped;
-    if (oldest.frames.empty())
-    {
-      this->Runs_.pop_front();
-    }
-  }
-}
-
-const GreyImage& FluoroscopyImager::RunFrame(std::int64_t run, std::size_t frame) const
-{
-  const auto found = std::find_if(this->Runs_.begin(), this->Runs_.end(),
-    [run](const Run& stored) { return stored.number == run; });
-  if (found == this->Runs_.end())
-  {
-    throw std::out_of_range("images: cine run " + std::to_string(run) + " is not stored");
-  }
-  if (frame >= found->frames.size())
-  {
-    throw std::out_of_range("images: cine run " + std::to_string(run) + " has " +
-      std::to_string(found->frames.size()) + " frames; frame " + std::to_string(frame) +
-      " is not one of them");
-  }
-  return found->frames[frame];
 }
 }

@@ -1,6 +1,6 @@
 /**
  * @file FluoroscopyImager.h
- * @brief The images of an examination: brightness, last image, cine runs, subtraction, roadmap.
+ * @brief The images of an examination: brightness, last image, subtraction, roadmap.
  *
  * Used by one thread, which gets Exposures from an ExposureClock; that it misses some is no error.
  */
@@ -12,7 +12,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <vector>
 
 namespace coronary
@@ -39,8 +38,6 @@ struct ImagerSettings
   double roadmapOpacity = 0.6;    ///< how bright the full contrast of a roadmap is, 0 to 1
   double roadmapThreshold = 0.08; ///< ln(photons) that a vessel takes away at least, 0 to 5
   int maskFrames = 1;             ///< averaged for a mask, 1 to 64
-  std::size_t cineMemory = std::size_t(256)
-    << 20; ///< bytes of stored runs; at least one frame is kept
 
   /// @throws std::invalid_argument that names the first setting out of range or not finite
   void Validate() const;
@@ -53,7 +50,7 @@ public:
   explicit FluoroscopyImager(const ImagerSettings& settings = {}, std::uint64_t seed = 1);
 
   /**
-   * Exposes a frame; when it is of a cine run, stores it.
+   * Exposes a frame.
    *
    * Brightness follows the mean of `background` between the shutters, slowly; never the frame itself, so that
    * contrast medium does not make it flicker.
@@ -77,28 +74,13 @@ public:
   /// Roadmap mode: false while vessels are gathered.
   bool HasRoadmap() const { return this->RoadmapReady; }
 
-  /// From the next frame on. Runs that are stored are kept within the new limit.
+  /// From the next frame on.
   /// @throws std::invalid_argument as ImagerSettings::Validate()
   void SetSettings(const ImagerSettings& settings);
   const ImagerSettings& Settings() const { return this->Settings_; }
 
   /// ln(photons) that is shown mid-grey in Plain mode.
   double DisplayLevel() const { return this->DisplayLevel_; }
-
-  /// A cine run of which frames are stored.
-  struct Run
-  {
-    std::int64_t number = 0;  ///< Exposure::run
-    double frameRate = 0.0;   ///< Hz
-    std::int64_t dropped = 0; ///< of its first frames, to stay within cineMemory
-    std::deque<GreyImage> frames;
-  };
-  /// In the order of exposure. The oldest frames are dropped first, and runs without frames.
-  const std::deque<Run>& Runs() const { return this->Runs_; }
-  /// @throws std::out_of_range when the run or the frame is not stored  @param frame  from 0, the first stored
-  const GreyImage& RunFrame(std::int64_t run, std::size_t frame) const;
-  std::int64_t DroppedFrames() const { return this->Dropped; }
-  std::size_t StoredBytes() const { return this->Stored; }
 
 private:
   void FitTo(int columns, int rows);
@@ -111,8 +93,6 @@ private:
   void GatherRoadmap();
   void FinishRoadmap();
   void AddRoadmap();
-  void Store(const Exposure& exposure);
-  void KeepWithinMemory();
 
   ImagerSettings Settings_;
   Detector Detector_;
@@ -131,9 +111,6 @@ private:
   std::int64_t RoadmapSequence = -1; ///< in which vessels are gathered; negative: not begun
   std::vector<float> Smoothed;       ///< opacification, low-pass over the frames
   std::vector<float> Roadmap;        ///< greatest opacification, ln(photons)
-  std::deque<Run> Runs_;
-  std::int64_t Dropped = 0;
-  std::size_t Stored = 0;
 };
 }
 

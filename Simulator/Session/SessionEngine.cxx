@@ -110,6 +110,7 @@ SessionEngine::SessionEngine(
   , Mux(std::move(mux))
   , Runner(world.wall, world.scenario, world.wallHash, this->MakeSource())
   , Imager(world.wall->Topology(), world.scenario, world.background, true)
+  , Runs(world.scenario, "coronary-simulator " DYNAMICCORONARY_VERSION)
   , TicksPerScene(std::max<std::uint64_t>(
       1, static_cast<std::uint64_t>(std::lround(this->TickRate / this->Options.sceneRate))))
 {
@@ -204,14 +205,25 @@ bool SessionEngine::CineFrame(std::size_t run, std::size_t frame, GreyImage& ima
   std::size_t& runs, std::size_t& frames) const
 {
   const std::lock_guard<std::mutex> lock(this->ImagerMutex);
-  const auto& stored = this->Imager.Images().Runs();
+  const std::deque<XrayAngiogram>& stored = this->Runs.Runs();
   runs = stored.size();
   frames = run < runs ? stored[run].frames.size() : 0;
   if (frame >= frames)
   {
     return false;
   }
-  image = stored[run].frames[frame];
+  image = { stored[run].columns, stored[run].rows, stored[run].frames[frame].pixels };
+  return true;
+}
+
+bool SessionEngine::CineRun(std::size_t run, XrayAngiogram& whole) const
+{
+  const std::lock_guard<std::mutex> lock(this->ImagerMutex);
+  if (run >= this->Runs.Runs().size())
+  {
+    return false;
+  }
+  whole = this->Runs.Runs()[run];
   return true;
 }
 
@@ -401,6 +413,7 @@ void SessionEngine::RunImages()
           this->Imager.Images().TakeMask();
         }
         this->ImageBuffer.image = this->Imager.Expose(moment);
+        this->Runs.Add(moment, this->ImageBuffer.image, static_cast<ImageMode>(mode));
         this->ImageBuffer.number = ++this->ImageNumber;
         this->ImageBuffer.completeness = this->Imager.BackgroundCompleteness();
         std::swap(this->ImageBuffer.moment, moment);

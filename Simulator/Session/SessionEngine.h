@@ -5,6 +5,7 @@
 #ifndef DynamicCoronary_SessionEngine_h
 #define DynamicCoronary_SessionEngine_h
 
+#include "CineRuns.h"
 #include "DeviceMux.h"
 #include "DriveScript.h"
 #include "FixedStepClock.h"
@@ -104,6 +105,8 @@ public:
   /// Cine runs, while nothing is exposed. @return false: no such frame
   bool CineFrame(std::size_t run, std::size_t frame, GreyImage& image, std::size_t& runs,
     std::size_t& frames) const;
+  /// All of a run. @return false: no such run
+  bool CineRun(std::size_t run, XrayAngiogram& whole) const;
 
   /// Compared and equal state hashes of a replay.
   std::pair<std::uint64_t, std::uint64_t> ReplayHashes() const
@@ -149,6 +152,7 @@ private:
   const RecordingReader* Recorded = nullptr; ///< likewise, with replay
   SessionRunner Runner;
   SessionImager Imager;
+  CineRuns Runs; ///< as the imager, under ImagerMutex
   std::uint64_t TicksPerScene;
 
   std::thread Physics;

@@ -70,6 +70,7 @@ private:
   void ShowDevices();
   void ShowRates();
   void ShowCine();
+  void SaveCine();
   void ShowKeys();
 
   void TakeScenarioOf(const std::string& recording);

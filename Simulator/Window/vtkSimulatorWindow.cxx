@@ -296,6 +296,7 @@ void SessionWindow::MakeToolBar()
   this->Recorder.filming =
     add("Video", "Films the window into a file", [this](bool on) { this->Recorder.Film(on); });
   this->Recorder.filming->setCheckable(true);
+  add("Save run ...", "The chosen cine run as a DICOM file", [this](bool) { this->SaveCine(); });
   bar->addSeparator();
   add("Help", "Keys and mouse", [this](bool) { this->ShowKeys(); });
 }
@@ -618,6 +619,31 @@ void SessionWindow::ShowCine()
     this->Monitor->SetImage(image);
     this->Monitor->SetRunText(
       QString("RUN %1/%2  FRAME %3/%4").arg(run + 1).arg(runs).arg(frame + 1).arg(frames));
+  }
+}
+
+void SessionWindow::SaveCine()
+{
+  const QString title = "Save a cine run";
+  XrayAngiogram run;
+  if (!this->Engine || !this->Engine->CineRun(this->XRay->Run(), run))
+  {
+    QMessageBox::information(this, title, "There is no cine run yet: hold C for one.");
+    return;
+  }
+  const QString path = QFileDialog::getSaveFileName(
+    this, title, QString::fromStdString(NameOfCineFile(run)), "DICOM files (*.dcm)");
+  if (path.isEmpty())
+  {
+    return;
+  }
+  try
+  {
+    WriteXrayAngiogram(std::move(run), path.toStdString());
+  }
+  catch (const std::exception& problem)
+  {
+    QMessageBox::warning(this, title, QString::fromUtf8(problem.what()));
   }
 }
 

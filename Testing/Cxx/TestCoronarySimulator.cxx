@@ -1,11 +1,14 @@
 // coronary-simulator as a user runs it: sessions, recordings and their replay, messages, exit codes.
 #include "AtomicFile.h"
 #include "FileSeries.h"
+#include "Recording.h"
+#include "SessionImager.h"
 #include "SimulatorRun.h"
 #include "VesselTestData.h"
 
 #include "vtkXMLPolyDataReader.h"
 
+#include <gdcmImageReader.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -14,7 +17,10 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <sstream>
+#include <string>
+#include <vector>
 
 namespace fs = std::filesystem;
 using nlohmann::json;
@@ -281,6 +287,64 @@ TEST_F(TestCoronarySimulator, RefusesWrongImagesAndContrast)
     this->Put("changed.json", scenario);
     this->ExpectFailure(1, "--scenario changed.json --ticks 10 --xray", part);
   }
+}
+
+TEST_F(TestCoronarySimulator, CineRunsBecomeDicomFiles)
+{
+  this->Put("s.json", TestScenario());
+  const auto pieces = [this](const json& list)
+  {
+    this->Put("cine.json",
+      { { "format", "dynamiccoronary script" }, { "version", 1 }, { "pieces", list } });
+  };
+  const auto hold = [](double seconds, const char* pedal) {
+    return json{ { "seconds", seconds }, { "pedals", { pedal } } };
+  };
+  pieces(
+    { hold(0.2, "fluoroscopy"), hold(0.4, "cine"), hold(0.2, "fluoroscopy"), hold(0.3, "cine") });
+  const std::string session = "--headless --scenario s.json --xray --script cine.json --output ";
+  ASSERT_EQ(this->Run(session + "a"), 0) << this->Said();
+  // Each frame is the one that was shown.
+  std::ifstream table(this->Folder / "a/frames.csv");
+  std::map<int, std::vector<std::string>> shown;
+  std::string line;
+  std::getline(table, line);
+  while (std::getline(table, line))
+  {
+    std::vector<std::string> cells;
+    std::istringstream words(line);
+    for (std::string cell; std::getline(words, cell, ',');)
+    {
+      cells.push_back(cell);
+    }
+    ASSERT_EQ(cells.size(), 11U) << line;
+    shown[std::stoi(cells[6])].push_back(cells[10]);
+  }
+  EXPECT_EQ(shown.size(), 3U);
+  for (const int run : { 1, 2 })
+  {
+    gdcm::ImageReader reader;
+    reader.SetFileName((this->Folder / "a/cine_0").concat(std::to_string(run) + ".dcm").c_str());
+    ASSERT_TRUE(reader.Read());
+    const gdcm::Image& image = reader.GetImage();
+    ASSERT_EQ(image.GetDimension(2), shown[run].size());
+    std::vector<char> pixels(image.GetBufferLength());
+    ASSERT_TRUE(image.GetBuffer(pixels.data()));
+    const std::size_t size = std::size_t(image.GetDimension(0)) * image.GetDimension(1);
+    for (std::size_t frame = 0; frame < shown[run].size(); ++frame)
+    {
+      coronary::GreyImage grey;
+      grey.columns = static_cast<int>(image.GetDimension(0));
+      grey.rows = static_cast<int>(image.GetDimension(1));
+      grey.values.assign(pixels.begin() + frame * size, pixels.begin() + (frame + 1) * size);
+      EXPECT_EQ(coronary::Hexadecimal(coronary::SessionImager::HashOf(grey)), shown[run][frame])
+        << run << ", " << frame;
+    }
+  }
+  // A session in the same folder takes the place of these.
+  pieces(json::array({ hold(0.1, "fluoroscopy") }));
+  ASSERT_EQ(this->Run(session + "a"), 0) << this->Said();
+  EXPECT_FALSE(fs::exists(this->Folder / "a/cine_01.dcm"));
 }
 
 // The model of a patient's images: made where it is not there, kept where it is, never that of others.

@@ -107,14 +107,6 @@ Exposure Frame(std::int64_t frame, std::int64_t sequence = 1, double photons = 2
   exposure.photons = photons;
   return exposure;
 }
-
-Exposure CineFrame(std::int64_t frame, std::int64_t run)
-{
-  Exposure exposure = Frame(frame, run);
-  exposure.cine = true;
-  exposure.run = run;
-  return exposure;
-}
 }
 
 TEST(FastMath, exponentialAndLogarithm)
@@ -580,46 +572,6 @@ TEST(FluoroscopyImager, roadmapPutsTheVesselsUnderTheLiveImage)
   EXPECT_NEAR(at(40), 127.5 - 255.0 * 0.3, 0.51);
   imager.SetMode(ImageMode::Roadmap);
   EXPECT_FALSE(imager.HasRoadmap());
-}
-
-TEST(FluoroscopyImager, runsAreStoredWithinTheirMemory)
-{
-  ImagerSettings settings;
-  const std::size_t frameBytes = 64 * 64 + sizeof(GreyImage);
-  settings.cineMemory = 10 * frameBytes;
-  FluoroscopyImager imager(settings);
-  const LineIntegrals nothing(64, 64);
-  const auto expose = [&](std::int64_t frame, std::int64_t run)
-  {
-    const LineIntegrals background = Flat(64, 64, 2.0F + 0.1F * static_cast<float>(frame));
-    return imager.Expose(background, nothing, nothing, CineFrame(frame, run));
-  };
-  std::vector<GreyImage> shown;
-  for (int frame = 0; frame < 4; ++frame)
-  {
-    shown.push_back(expose(frame, 1));
-  }
-  imager.Expose(nothing, nothing, nothing, Frame(4));
-  ASSERT_EQ(imager.Runs().size(), 1U);
-  EXPECT_EQ(imager.RunFrame(1, 2).values, shown[2].values);
-  for (int frame = 5; frame < 13; ++frame)
-  {
-    shown.push_back(expose(frame, 2));
-  }
-  // Twelve frames where there is room for ten.
-  EXPECT_EQ(imager.DroppedFrames(), 2);
-  EXPECT_EQ(imager.StoredBytes(), 10 * frameBytes);
-  EXPECT_EQ(imager.Runs().front().dropped, 2);
-  EXPECT_EQ(imager.RunFrame(1, 0).values, shown[2].values);
-  EXPECT_EQ(imager.RunFrame(2, 7).values, shown[11].values);
-  EXPECT_THROW(imager.RunFrame(1, 2), std::out_of_range);
-  EXPECT_THROW(imager.RunFrame(3, 0), std::out_of_range);
-  // One frame always stays; runs without frames go.
-  settings.cineMemory = 0;
-  imager.SetSettings(settings);
-  EXPECT_EQ(imager.Runs().size(), 1U);
-  EXPECT_EQ(imager.DroppedFrames(), 11);
-  EXPECT_EQ(imager.RunFrame(2, 0).values, shown[11].values);
 }
 
 TEST(FluoroscopyImager, refusesWhatIsNotPossible)
