@@ -183,13 +183,7 @@ void AddStudy(DataSetWriter& data, const XrayAngiogram& run, const std::string& 
   data.Text(0x0008, 0x0070, VR::LO, "DynamicCoronary");
   data.Text(0x0008, 0x0090, VR::PN, "");
   data.Text(0x0008, 0x1030, VR::LO, "Simulated coronary angiography");
-  char view[64];
-  std::snprintf(view, sizeof view, "%s %ld %s %ld",
-    run.frames.front().primary < 0.0 ? "RAO" : "LAO",
-    std::lround(std::abs(run.frames.front().primary)),
-    run.frames.front().secondary < 0.0 ? "CAUD" : "CRAN",
-    std::lround(std::abs(run.frames.front().secondary)));
-  data.Text(0x0008, 0x103e, VR::LO, view);
+  data.Text(0x0008, 0x103e, VR::LO, NameText(run.view));
   data.Text(0x0008, 0x1090, VR::LO, "coronary-simulator");
   data.Text(0x0010, 0x0010, VR::PN, "Simulated^" + NameText(run.patient));
   data.Text(0x0010, 0x0020, VR::LO, "Simulated");

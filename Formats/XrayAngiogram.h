@@ -27,6 +27,7 @@ struct XrayAngiogram
   };
 
   std::string patient; ///< a name; the file says that the images are simulated
+  std::string view;    ///< of the first frame, for people
   std::string program; ///< version that made them
   std::uint64_t study =
     0; ///< the same for all runs of a session, and another one for other sessions

@@ -6,12 +6,14 @@
 #define DynamicCoronary_SessionPictures_h
 
 #include "Recording.h"
+#include "ReportPage.h"
 #include "SessionWorld.h"
 #include "TrainingSession.h"
 
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace coronary
 {
@@ -43,6 +45,8 @@ public:
 
   std::size_t Frames() const;
   const std::string& FrameTable() const; ///< CSV of the frames
+  /// Of each cine run the frame with the most contrast medium in the vessels.
+  std::vector<ReportPicture> BestFrames() const;
 
 private:
   struct Internals;

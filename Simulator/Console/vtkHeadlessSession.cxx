@@ -7,6 +7,7 @@
 #include "PatientModel.h"
 #include "Program.h"
 #include "ProgressDisplay.h"
+#include "ReportPage.h"
 #include "SessionImager.h"
 #include "SessionPictures.h"
 #include "SessionRunner.h"
@@ -83,6 +84,8 @@ Json MetricsToJson(const SessionMetrics& metrics, const WallTopology& topology)
     { "greatest_tip_force_N", metrics.maximumTipForce },
     { "forceful_tip_s", metrics.forcefulSeconds }, { "wire_travel_mm", metrics.wireTravel },
     { "wire_turning_rad", metrics.wireTurning }, { "deepest_mm", metrics.deepest },
+    { "wire_travel_without_xray_mm", metrics.blindTravel },
+    { "idle_xray_s", metrics.idleBeamSeconds }, { "occluded_s", metrics.occludedSeconds },
     { "path", branches }, { "events", events } };
 }
 
@@ -122,6 +125,30 @@ Json StentsToJson(const std::vector<StentResult>& stents)
     list.push_back(json);
   }
   return list;
+}
+
+Json ProcedureToJson(const std::vector<ProcedureStep>& steps, const TrainingSession& session)
+{
+  Json json = { { "steps", Json::array() } };
+  const std::vector<double>& reached = session.Procedure().reached;
+  for (std::size_t n = 0; n < steps.size(); ++n)
+  {
+    const char* value = nullptr;
+    json["steps"].push_back({ { "text", steps[n].text }, { "goal", NameOf(steps[n].goal, value) },
+      { "seconds", n < reached.size() ? Json(reached[n]) : Json(nullptr) } });
+  }
+  const ProcedureScore score = session.Score();
+  json["passed"] = score.passed;
+  json["failures"] = score.failures;
+  json["points"] = score.points;
+  json["formula"] = "100 less the sum of min(most, weight * amount)";
+  for (const ScoreItem& item : score.items)
+  {
+    json["items"].push_back(
+      { { "what", item.name }, { "amount", item.amount }, { "unit", item.unit },
+        { "weight", item.weight }, { "most", item.most }, { "lost", item.Lost() } });
+  }
+  return json;
 }
 
 /// Along the stents, a line a ring.
@@ -204,6 +231,13 @@ public:
       session.Contrast().AorticPressure(), session.Metrics().airKerma,
       session.Metrics().doseAreaProduct);
     this->Flows += text;
+    this->Seconds.push_back(seconds);
+    const double values[] = { report.tipForce, report.proximalForce, report.balloon.pressure,
+      medium.inTree, session.Contrast().AorticPressure() };
+    for (std::size_t n = 0; n < this->Curves.size(); ++n)
+    {
+      this->Curves[n].values.push_back(values[n]);
+    }
     this->AddBalloon(session, seconds);
     const std::vector<Vector3>& line = intervention.Centerline();
     if (line.size() > 1)
@@ -232,6 +266,12 @@ public:
     {
       WriteFileAtomically(this->Folder->Add("frames.csv"), pictures.FrameTable());
     }
+    if (!this->HasBalloon)
+    {
+      this->Curves.erase(this->Curves.begin() + BalloonCurve);
+    }
+    WriteFileAtomically(this->Folder->Add("report.html"),
+      ReportPage(statistics, this->Seconds, this->Curves, pictures.BestFrames()));
     WriteFileAtomically(this->Folder->Add("contrast.csv"), this->Flows);
     if (this->HasBalloon)
     {
@@ -298,6 +338,11 @@ private:
   std::string Tips;
   std::string Balloons;
   bool HasBalloon = false;
+  static constexpr std::ptrdiff_t BalloonCurve = 2;
+  std::vector<double> Seconds;
+  std::vector<ReportCurve> Curves{ { "force of the tip on the wall, N", {} },
+    { "force at the hand, against advancing, N", {} }, { "pressure in the balloon, atm", {} },
+    { "contrast medium in the vessels, mL", {} }, { "aortic pressure, mmHg", {} } };
   std::uint64_t Tick = 0;
 };
 
@@ -534,6 +579,13 @@ public:
           100.0 * one.LeastExpanded()->Expansion(), 100.0 * one.residual, one.GreatestGap()->gap);
       }
     }
+    if (!this->World.scenario.procedure.empty())
+    {
+      for (const std::string& line : LinesOf(this->Runner.Session().Score()))
+      {
+        std::printf("%s\n", line.c_str());
+      }
+    }
     if (this->Replay)
     {
       std::printf("%llu of %llu hashes are equal\n",
@@ -599,6 +651,10 @@ private:
         !lesions.empty())
     {
       result["lesions"] = LesionsToJson(lesions);
+    }
+    if (!scenario.procedure.empty())
+    {
+      result["procedure"] = ProcedureToJson(scenario.procedure, this->Runner.Session());
     }
     if (scenario.balloon)
     {

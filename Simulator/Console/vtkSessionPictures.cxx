@@ -13,6 +13,7 @@
 
 #include <cstdio>
 #include <cstring>
+#include <map>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -42,6 +43,12 @@ struct SessionPictures::Internals
   std::unique_ptr<vtkSimulatorScene> Scene;
   std::unique_ptr<vtkScenePicture> Picture;
   std::optional<CineRuns> Runs;
+  struct Best
+  {
+    double contrast = -1.0; ///< mL
+    ReportPicture picture;
+  };
+  std::map<std::int64_t, Best> BestOfRuns;
   SessionSnapshot Moment;
   std::size_t Frames = 0;
   std::size_t Scenes = 0;
@@ -126,6 +133,16 @@ void SessionPictures::AddFrame(
     now.pose.secondary / Degree, now.report.phase, static_cast<long long>(now.exposure.run),
     now.exposure.photons, now.metrics.airKerma, now.contrast.injected, Hexadecimal(hash).c_str());
   data.Table += line;
+  if (now.exposure.cine)
+  {
+    Internals::Best& best = data.BestOfRuns[now.exposure.run];
+    if (now.contrast.inTree > best.contrast)
+    {
+      std::snprintf(line, sizeof(line), "Run %lld, %s at %.1f s",
+        static_cast<long long>(now.exposure.run), ViewName(now.pose).c_str(), now.seconds);
+      best = { now.contrast.inTree, { name, line } };
+    }
+  }
   ++data.Frames;
 }
 
@@ -151,6 +168,16 @@ void SessionPictures::AddScene(const TrainingSession& session, const FolderCallb
 std::size_t SessionPictures::Frames() const
 {
   return this->Data->Frames;
+}
+
+std::vector<ReportPicture> SessionPictures::BestFrames() const
+{
+  std::vector<ReportPicture> pictures;
+  for (const auto& [run, best] : this->Data->BestOfRuns)
+  {
+    pictures.push_back(best.picture);
+  }
+  return pictures;
 }
 
 const std::string& SessionPictures::FrameTable() const

@@ -10,7 +10,6 @@ namespace coronary
 namespace
 {
 constexpr RequireOf RequireCArm{ "C-arm" };
-
 }
 
 bool CArmPose::operator==(const CArmPose& other) const
@@ -24,6 +23,25 @@ bool DetectorFormat::operator==(const DetectorFormat& other) const
 {
   return this->columns == other.columns && this->rows == other.rows && this->width == other.width &&
     this->height == other.height;
+}
+
+Vector3 BeamDirection(const CArmPose& pose)
+{
+  return { std::sin(pose.primary) * std::cos(pose.secondary),
+    -std::cos(pose.primary) * std::cos(pose.secondary), std::sin(pose.secondary) };
+}
+
+std::string ViewName(const CArmPose& pose)
+{
+  const long primary = std::lround(pose.primary / Degree);
+  const long secondary = std::lround(pose.secondary / Degree);
+  std::string name =
+    primary == 0 ? "AP" : (primary > 0 ? "LAO " : "RAO ") + std::to_string(std::abs(primary));
+  if (secondary != 0)
+  {
+    name += (secondary > 0 ? " CRA " : " CAU ") + std::to_string(std::abs(secondary));
+  }
+  return name;
 }
 
 CArmGeometry::CArmGeometry(const CArmPose& pose, const DetectorFormat& format)
@@ -50,11 +68,10 @@ CArmGeometry::CArmGeometry(const CArmPose& pose, const DetectorFormat& format)
   const double sinA = std::sin(pose.primary);
   const double cosA = std::cos(pose.primary);
   const double sinB = std::sin(pose.secondary);
-  const double cosB = std::cos(pose.secondary);
   // The arm's tilt towards the head happens in its own plane, which the primary angle has turned.
-  this->Forward = Vector3(sinA * cosB, -cosA * cosB, sinB);
+  this->Forward = BeamDirection(pose);
   this->Right = Vector3(cosA, sinA, 0.0);
-  this->Down = Vector3(sinA * sinB, -cosA * sinB, -cosB);
+  this->Down = Vector3(sinA * sinB, -cosA * sinB, -std::cos(pose.secondary));
   this->Source_ = pose.isocentre - pose.sourceToIsocentre * this->Forward;
   this->DetectorCentre_ = this->Source_ + pose.sourceToDetector * this->Forward;
   this->ColumnSpacing = format.width / format.columns;

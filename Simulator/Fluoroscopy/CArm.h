@@ -11,6 +11,8 @@
 
 #include "Geometry.h"
 
+#include <string>
+
 namespace coronary
 {
 struct CArmPose
@@ -26,6 +28,12 @@ struct CArmPose
   bool operator==(const CArmPose& other) const;
   bool operator!=(const CArmPose& other) const { return !(*this == other); }
 };
+
+/// From the source towards the detector, unit.
+Vector3 BeamDirection(const CArmPose& pose);
+
+/// As it is called in a laboratory, in whole degrees: "AP", "RAO 30 CRA 20".
+std::string ViewName(const CArmPose& pose);
 
 struct DetectorFormat
 {

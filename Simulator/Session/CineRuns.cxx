@@ -66,6 +66,7 @@ void CineRuns::Begin(const SessionSnapshot& moment, const GreyImage& image, bool
   }
   XrayAngiogram run;
   run.patient = this->Patient;
+  run.view = ViewName(moment.pose);
   run.program = this->Program;
   run.study = this->Study;
   run.run = static_cast<int>(moment.exposure.run);

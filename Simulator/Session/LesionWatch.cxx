@@ -72,6 +72,12 @@ LesionWatch::LesionWatch(const WallTopology& topology, const ContrastModel& medi
           ? 0.0
           : one.along.back() + (axisAt(lesion.points[n]) - axisAt(lesion.points[n - 1])).norm());
     }
+    const VesselWay way = WayThrough(topology, branch);
+    for (std::size_t n = 0; n < way.points.size(); ++n)
+    {
+      one.from = way.points[n] == lesion.points.front() ? way.place[n] : one.from;
+      one.to = way.points[n] == last ? way.place[n] : one.to;
+    }
     this->Distal.push_back({ branch, along.abscissa[last - this->First[branch]] });
     one.lesion = std::move(lesion);
     this->Lesions.push_back(std::move(one));
@@ -336,6 +342,11 @@ std::vector<LesionResult> LesionWatch::Results(
     result.reserveBefore = this->ReserveBefore[n];
     result.reserve = reserve[n];
     result.stretch = one.stretch;
+    result.from = one.from;
+    result.to = one.to;
+    const std::vector<std::int64_t>& points = one.lesion.points;
+    result.holdsBalloon =
+      std::find(points.begin(), points.end(), instruments.Report().balloon.place) != points.end();
     results.push_back(std::move(result));
   }
   return results;

@@ -28,6 +28,9 @@ struct LesionResult
   double reserveBefore = 0.0; ///< FFR when the session began
   double reserve = 0.0;       ///< FFR now
   double stretch = 0.0;       ///< greatest diameter that a balloon gave it, over the reference
+  double from = 0.0;          ///< mm from the ostium
+  double to = 0.0;
+  bool holdsBalloon = false; ///< the balloon's middle is in it
 };
 
 /// Something that a report has to name.
@@ -83,6 +86,8 @@ private:
     FoundLesion lesion;
     std::vector<double> along; ///< mm from its beginning, of its points
     double reference = 0.0;    ///< mm, radius
+    double from = 0.0;         ///< mm from the ostium
+    double to = 0.0;
     double stretch = 0.0;
     double meanDistal = 0.0; ///< mmHg
     double meanAortic = 0.0;

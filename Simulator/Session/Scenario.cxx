@@ -24,6 +24,25 @@ constexpr double MaximumSeed = 9007199254740992.0; // 2^53: every JSON reader ho
 const char* const DominanceNames[] = { "right", "left", "balanced" };
 const char* const MotionNames[] = { "automatic", "tracked", "still", "contraction" };
 
+/// Of files: a goal, and its value with its range.
+struct GoalName
+{
+  ProcedureStep::Goal goal;
+  const char* name;
+  const char* value; ///< null: it has none
+  double low;
+  double high;
+};
+constexpr GoalName GoalNames[] = { { ProcedureStep::Goal::Angiogram, "angiogram", "views", 1.0,
+                                     20.0 },
+  { ProcedureStep::Goal::WireIn, "wire_in", nullptr, 0.0, 0.0 },
+  { ProcedureStep::Goal::WireBeyondLesion, "wire_beyond_lesion", "mm", 0.0, 200.0 },
+  { ProcedureStep::Goal::BalloonInLesion, "balloon_in_lesion", "atm", 0.5, 40.0 },
+  { ProcedureStep::Goal::StentInLesion, "stent_in_lesion", nullptr, 0.0, 0.0 },
+  { ProcedureStep::Goal::StenosisBelow, "stenosis_below", "percent", 1.0, 100.0 },
+  { ProcedureStep::Goal::ReserveAbove, "ffr_above", "ffr", 0.0, 1.0 },
+  { ProcedureStep::Goal::WireBack, "wire_back", nullptr, 0.0, 0.0 } };
+
 /// A number of the file, its range, and where it goes; one list for reading and writing.
 struct NumberEntry
 {
@@ -416,6 +435,51 @@ VesselLesion LesionOf(const Json& object, const std::string& where)
   return lesion;
 }
 
+ProcedureStep StepOf(const Json& object, const std::string& where)
+{
+  ProcedureStep step;
+  JsonFields fields(object, where);
+  step.text = fields.Text("text");
+  const std::string name = fields.Text("goal");
+  const GoalName* goal = std::find_if(std::begin(GoalNames), std::end(GoalNames),
+    [&](const GoalName& one) { return name == one.name; });
+  if (goal == std::end(GoalNames))
+  {
+    std::string list;
+    for (const GoalName& one : GoalNames)
+    {
+      list += (list.empty() ? "" : ", ") + std::string(one.name);
+    }
+    fields.Refuse("has 'goal': '" + name.substr(0, 60) + "' is none of " + list);
+  }
+  step.goal = goal->goal;
+  step.vessel = step.goal == ProcedureStep::Goal::WireIn ? fields.Text("vessel")
+    : step.goal == ProcedureStep::Goal::Angiogram || step.goal == ProcedureStep::Goal::WireBack
+    ? ""
+    : fields.Text("vessel", "");
+  if (goal->value)
+  {
+    step.value = fields.Number(goal->value, goal->low, goal->high);
+  }
+  fields.Done();
+  return step;
+}
+
+Json StepToJson(const ProcedureStep& step)
+{
+  const char* value = nullptr;
+  Json json = { { "text", step.text }, { "goal", NameOf(step.goal, value) } };
+  if (!step.vessel.empty())
+  {
+    json["vessel"] = step.vessel;
+  }
+  if (value)
+  {
+    json[value] = step.value;
+  }
+  return json;
+}
+
 bool StartsWith(const std::string& text, const char* start)
 {
   return text.rfind(start, 0) == 0;
@@ -431,6 +495,19 @@ bool BeginsArtery(const std::string& name, const std::string& artery)
   return StartsWith(name, "LM") || StartsWith(name, "LCA") || StartsWith(name, "pLAD") ||
     StartsWith(name, "pLCx");
 }
+}
+
+const char* NameOf(ProcedureStep::Goal goal, const char*& value)
+{
+  for (const GoalName& one : GoalNames)
+  {
+    if (one.goal == goal)
+    {
+      value = one.value;
+      return one.name;
+    }
+  }
+  throw std::logic_error("a goal has no name");
 }
 
 Scenario ScenarioFromText(
@@ -497,6 +574,11 @@ Scenario ScenarioFromText(
     scenario.lesions.push_back(
       LesionOf(entry, origin + ", lesion " + std::to_string(scenario.lesions.size() + 1)));
   }
+  for (const Json& entry : fields.Has("procedure") ? fields.List("procedure") : none)
+  {
+    scenario.procedure.push_back(
+      StepOf(entry, origin + ", step " + std::to_string(scenario.procedure.size() + 1)));
+  }
   const auto part = [&](const char* name)
   { return fields.Has(name) ? fields.Object(name) : Json::object(); };
   scenario.settings = SettingsOf(part("settings"), origin + ", settings");
@@ -530,6 +612,10 @@ std::string ScenarioText(const Scenario& scenario)
     json["lesions"].push_back(
       { { "vessel", lesion.vessel }, { "at_mm", lesion.place }, { "length_mm", lesion.length },
         { "degree", lesion.degree }, { "calcium_arc_deg", lesion.calciumArc } });
+  }
+  for (const ProcedureStep& step : scenario.procedure)
+  {
+    json["procedure"].push_back(StepToJson(step));
   }
   return json.dump(2) + "\n";
 }

@@ -40,6 +40,29 @@ struct ImagingSettings
   double cineRate = 15.0;     ///< Hz of cine
 };
 
+/// Of a procedure: what is to be done before the next one.
+struct ProcedureStep
+{
+  enum class Goal
+  {
+    Angiogram, ///< value: cine runs with contrast medium, from views at least 25 degrees apart
+    WireIn,    ///< the wire's tip is in `vessel`, or behind it
+    WireBeyondLesion, ///< value: mm of wire behind the lesion
+    BalloonInLesion,  ///< value: atm of a balloon whose middle is in the lesion
+    StentInLesion,    ///< a stent is in it
+    StenosisBelow,    ///< value: per cent of the diameter, without an open balloon
+    ReserveAbove,     ///< value: FFR, likewise
+    WireBack          ///< wire and balloon are in the guide
+  };
+  Goal goal = Goal::Angiogram;
+  std::string text;   ///< what to do, for people
+  std::string vessel; ///< of WireIn; of the lesion, else the narrowest of the session's beginning
+  double value = 0.0;
+};
+
+/// Words of scenario files for it, and for its value. @param value  null: it has none
+const char* NameOf(ProcedureStep::Goal goal, const char*& value);
+
 struct Scenario
 {
   std::string name;
@@ -51,6 +74,7 @@ struct Scenario
   std::optional<BalloonCatheter> balloon; ///< none: the session has none
   std::vector<BalloonCatheter> exchanges; ///< for it, in their order; none without a balloon
   std::vector<VesselLesion> lesions;      ///< set into the vessels
+  std::vector<ProcedureStep> procedure;   ///< what a trainee is to do; none: to drive about
   InterventionSettings settings;
   ImagingSettings imaging;
   ContrastSettings contrast;

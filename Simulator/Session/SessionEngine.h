@@ -97,6 +97,9 @@ public:
   bool LatestScene(SessionSnapshot& snapshot);
   bool LatestImage(ShownImage& image);
 
+  /// Of the scenario's procedure. After Stop().
+  ProcedureScore Score() const { return this->Runner.Session().Score(); }
+
   /// What the session said since the last call, a sentence each, with its second.
   std::vector<std::string> TakeMessages();
 

@@ -4,8 +4,10 @@
 #include "HandAxes.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <utility>
 
 namespace coronary
@@ -13,6 +15,7 @@ namespace coronary
 namespace
 {
 constexpr double ContrastStep = 0.005;    // s
+constexpr double GoalStep = 0.05;         // s
 constexpr double FastestInjection = 12.0; // mL/s: no hand and no injector of a laboratory does more
 constexpr double NearestDetector = 50.0;  // mm behind the isocentre
 constexpr double FurthestDetector = 1500.0; // mm from the source
@@ -58,10 +61,15 @@ struct TrainingSession::Internals
     , HeartRate(this->Settings.heartRate)
     , TicksOfContrast(std::max<std::uint64_t>(
         1, static_cast<std::uint64_t>(std::lround(this->Settings.tickRate * ContrastStep))))
+    , TicksOfProcedure(std::max<std::uint64_t>(
+        1, static_cast<std::uint64_t>(std::lround(this->Settings.tickRate * GoalStep))))
     , Field(scenario.imaging.fieldOfView)
   {
     this->Pose = scenario.imaging.pose;
     this->SetField();
+    this->Steps = scenario.procedure;
+    this->Procedure.emplace(this->Steps, this->Wall->Topology(),
+      this->Watch.Results(this->Physics, this->Medium), scenario.balloon.has_value());
     for (std::size_t n = 0; const BalloonCatheter* one = BalloonOf(scenario, n); ++n)
     {
       RequireFit(*one, scenario.catheter);
@@ -73,6 +81,8 @@ struct TrainingSession::Internals
   void SetField();
   void StepContrast(const SessionInput& input);
   void Measure(const SessionInput& input);
+  void MeasureHands(const SessionInput& input);
+  void StepProcedure();
   bool Exchange(double number);
 
   std::shared_ptr<WallMotion> Wall;
@@ -81,11 +91,15 @@ struct TrainingSession::Internals
   Intervention Physics;
   ContrastModel Medium;
   LesionWatch Watch;
+  std::vector<ProcedureStep> Steps;
+  std::optional<ProcedureWatch> Procedure;
+  double LastMoved = 0.0; // s
   std::vector<BalloonCatheter> Balloons;
   std::size_t BalloonNumber = 0;
   ExposureClock Clock;
   double HeartRate;
   std::uint64_t TicksOfContrast;
+  std::uint64_t TicksOfProcedure;
   double Field;
   CArmPose Pose;
   SessionReport Report;
@@ -167,10 +181,8 @@ void TrainingSession::Internals::Measure(const SessionInput& input)
   metrics.maximumWallForce = std::max(metrics.maximumWallForce, tick.maximumForce);
   metrics.maximumTipForce = std::max(metrics.maximumTipForce, tick.tipForce);
   metrics.forcefulSeconds += tick.tipForce > ForcefulTip ? seconds : 0.0;
-  const double travel = std::abs(input.drive.wirePosition - this->Last.drive.wirePosition);
-  const double turn = std::abs(input.drive.wireAngle - this->Last.drive.wireAngle);
-  metrics.wireTravel += std::isfinite(travel) ? travel : 0.0;
-  metrics.wireTurning += std::isfinite(turn) ? turn : 0.0;
+  metrics.occludedSeconds += tick.balloon.wallPressure > 0.0 ? seconds : 0.0;
+  this->MeasureHands(input);
   metrics.deepest = std::max(metrics.deepest, tick.inserted);
   if (tick.branch >= 0 &&
     std::find(metrics.branches.begin(), metrics.branches.end(), tick.branch) ==
@@ -187,6 +199,48 @@ void TrainingSession::Internals::Measure(const SessionInput& input)
   {
     metrics.events = this->Watch.Events();
   }
+  if (!this->Procedure->Done() && this->Tick % this->TicksOfProcedure == 0)
+  {
+    this->StepProcedure();
+  }
+}
+
+void TrainingSession::Internals::MeasureHands(const SessionInput& input)
+{
+  SessionMetrics& metrics = this->Metrics;
+  const double seconds = 1.0 / this->Settings.tickRate;
+  const double travel = std::abs(input.drive.wirePosition - this->Last.drive.wirePosition);
+  const double turn = std::abs(input.drive.wireAngle - this->Last.drive.wireAngle);
+  metrics.wireTravel += std::isfinite(travel) ? travel : 0.0;
+  metrics.wireTurning += std::isfinite(turn) ? turn : 0.0;
+  const bool radiates = this->Clock.Radiating();
+  if (!radiates && this->Report.tick.inserted > 0.0)
+  {
+    metrics.blindTravel += std::isfinite(travel) ? travel : 0.0;
+  }
+  const auto values = [](const SessionInput& hands)
+  {
+    return std::array<double, 11>{ hands.drive.wirePosition, hands.drive.wireAngle,
+      hands.drive.catheterPosition, hands.drive.catheterAngle, hands.drive.balloonPosition,
+      hands.drive.inflation, hands.syringe, hands.primary, hands.secondary, hands.sourceToDetector,
+      hands.table.sum() };
+  };
+  if (!radiates || values(input) != values(this->Last))
+  {
+    this->LastMoved = metrics.procedureSeconds;
+  }
+  metrics.idleBeamSeconds +=
+    metrics.procedureSeconds - this->LastMoved > LongestLook ? seconds : 0.0;
+}
+
+void TrainingSession::Internals::StepProcedure()
+{
+  const bool lesions = this->Procedure->NeedsLesions();
+  this->Procedure->Step({ this->Report.tick, this->Metrics, this->Pose,
+                          this->Clock.Radiating() && this->Clock.Last().cine, this->Clock.Runs(),
+                          this->Medium.Balance().injected },
+    lesions ? this->Watch.Results(this->Physics, this->Medium) : std::vector<LesionResult>(),
+    lesions ? this->Watch.Stents(this->Physics) : std::vector<StentResult>(), this->Messages);
 }
 
 bool TrainingSession::Internals::Exchange(double number)
@@ -330,6 +384,18 @@ std::vector<StentResult> TrainingSession::Stents() const
   return this->Data->Watch.Stents(this->Data->Physics);
 }
 
+const ProcedureState& TrainingSession::Procedure() const
+{
+  return this->Data->Procedure->State();
+}
+
+ProcedureScore TrainingSession::Score() const
+{
+  const Internals& data = *this->Data;
+  return ScoreOf(
+    data.Steps, data.Procedure->State(), data.Metrics, this->Stents(), data.Report.tick);
+}
+
 const WallTopology& TrainingSession::Topology() const
 {
   return this->Data->Wall->Topology();
@@ -390,6 +456,7 @@ void TrainingSession::SnapshotOfImage(SessionSnapshot& snapshot) const
   snapshot.heartRate = data.HeartRate;
   snapshot.report = data.Report.tick;
   snapshot.metrics = data.Metrics;
+  snapshot.procedure = data.Procedure->State();
   snapshot.contrast = data.Medium.Balance();
   snapshot.injection = data.Report.injection;
   snapshot.aorticPressure = data.Medium.AorticPressure();

@@ -11,9 +11,11 @@
 #include "ContrastModel.h"
 #include "Intervention.h"
 #include "LesionWatch.h"
+#include "Procedure.h"
 #include "Recording.h"
 #include "Scenario.h"
 #include "SessionInput.h"
+#include "SessionMetrics.h"
 
 #include <cstdint>
 #include <memory>
@@ -22,29 +24,6 @@
 
 namespace coronary
 {
-/// What distinguishes trainees.
-struct SessionMetrics
-{
-  double procedureSeconds = 0.0;
-  double fluoroscopySeconds = 0.0; ///< pedal down, cine included
-  double cineSeconds = 0.0;
-  std::int64_t frames = 0;       ///< exposed
-  double airKerma = 0.0;         ///< mGy at the reference point
-  double doseAreaProduct = 0.0;  ///< Gy cm^2
-  double contrast = 0.0;         ///< mL of contrast medium
-  double maximumWallForce = 0.0; ///< N of one contact
-  double maximumTipForce = 0.0;  ///< N
-  double forcefulSeconds = 0.0;  ///< tip force above ForcefulTip
-  double wireTravel = 0.0;       ///< mm, forth and back together
-  double wireTurning = 0.0;      ///< radians, left and right together
-  double deepest = 0.0;          ///< mm of wire beyond the catheter's tip
-  std::vector<int> branches; ///< in which the tip has been, in the order in which they were reached
-  std::vector<ProcedureEvent> events;
-};
-
-/// N: what a tip that is pushed against a wall should not do for long. The tips of workhorse wires buckle below it.
-constexpr double ForcefulTip = 0.1;
-
 struct SessionReport
 {
   TickReport tick;
@@ -83,6 +62,7 @@ struct SessionSnapshot
   std::size_t balloonNumber = 0;    ///< as BalloonOf
   std::vector<StentShape> stents;
   ///@}
+  ProcedureState procedure;          ///< of a scenario's steps
   std::vector<LesionResult> lesions; ///< only of SnapshotOfScene
   std::vector<StentResult> results;  ///< only of SnapshotOfScene: of the stents in the wall
   std::vector<Vector3> wall;         ///< only of SnapshotOfScene
@@ -127,6 +107,9 @@ public:
   const ContrastModel& Contrast() const;
   std::vector<LesionResult> Lesions() const;
   std::vector<StentResult> Stents() const; ///< that are in the wall
+  const ProcedureState& Procedure() const;
+  /// Of the scenario's procedure, as far as it went.
+  ProcedureScore Score() const;
   const WallTopology& Topology() const;
   const CArmPose& Pose() const;
   double FieldOfView() const; ///< mm of the detector, across

@@ -29,15 +29,6 @@ QString SideText(double degrees, const QString& positive, const QString& negativ
   return whole == 0 ? size : (whole > 0 ? positive : negative) + " " + size;
 }
 
-QString ViewText(double primary, double secondary)
-{
-  const bool straight = std::lround(primary / Degree) == 0;
-  const QString first = straight ? QString("AP") : SideText(primary / Degree, "LAO", "RAO");
-  return std::lround(secondary / Degree) == 0
-    ? first
-    : first + "  " + SideText(secondary / Degree, "CRA", "CAU");
-}
-
 FluoroscopyWidget::FluoroscopyWidget(QWidget* parent)
   : QWidget(parent)
 {
@@ -124,8 +115,7 @@ void FluoroscopyWidget::paintEvent(QPaintEvent*)
   };
   const QColor plain(225, 232, 235);
   const SessionMetrics& metrics = this->Now.metrics;
-  write(Qt::AlignLeft | Qt::AlignTop, 0, ViewText(this->Now.pose.primary, this->Now.pose.secondary),
-    plain);
+  write(Qt::AlignLeft | Qt::AlignTop, 0, QString::fromStdString(ViewName(this->Now.pose)), plain);
   write(Qt::AlignLeft | Qt::AlignTop, 1,
     QString("SID %1 mm   FOV %2 mm")
       .arg(this->Now.pose.sourceToDetector, 0, 'f', 0)

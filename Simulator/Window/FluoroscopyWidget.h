@@ -20,9 +20,6 @@ namespace coronary
 /// "LAO 30", "RAO 30": whole degrees, by their side; 0 has none.
 QString SideText(double degrees, const QString& positive, const QString& negative);
 
-/// "LAO 30  CRA 20", whole degrees.
-QString ViewText(double primary, double secondary);
-
 class FluoroscopyWidget : public QWidget
 {
 public:

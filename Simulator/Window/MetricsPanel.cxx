@@ -16,7 +16,8 @@ MetricsPanel::MetricsPanel()
   this->setToolTip("What distinguishes trainees");
 }
 
-void MetricsPanel::ShowMetrics(const SessionMetrics& metrics, const WallTopology& topology)
+void MetricsPanel::ShowMetrics(
+  const SessionMetrics& metrics, const WallTopology& topology, const std::string& next)
 {
   QString branches;
   QString last;
@@ -26,7 +27,8 @@ void MetricsPanel::ShowMetrics(const SessionMetrics& metrics, const WallTopology
     branches += name == last ? QString() : (branches.isEmpty() ? "" : ", ") + name;
     last = name;
   }
-  this->setText(
+  const QString step = QString::fromStdString(next);
+  this->setText((step.isEmpty() ? step : step + "\n") +
     QString("Time  %1 s    Fluoroscopy  %2 s (cine %3 s)\nDose  %4 mGy, %5 Gy cm%6, %7 frames\n"
             "Contrast  %8 mL    Greatest wall force  %9 N\n")
       .arg(metrics.procedureSeconds, 0, 'f', 0)

@@ -9,13 +9,17 @@
 
 #include <QLabel>
 
+#include <string>
+
 namespace coronary
 {
 class MetricsPanel : public QLabel
 {
 public:
   MetricsPanel();
-  void ShowMetrics(const SessionMetrics& metrics, const WallTopology& topology);
+  /// @param next  step of the procedure; may be empty
+  void ShowMetrics(
+    const SessionMetrics& metrics, const WallTopology& topology, const std::string& next);
 };
 }
 

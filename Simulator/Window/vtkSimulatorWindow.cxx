@@ -417,6 +417,13 @@ void SessionWindow::End()
   try
   {
     this->Engine->Stop();
+    if (!this->World.scenario.procedure.empty())
+    {
+      for (const std::string& line : LinesOf(this->Engine->Score()))
+      {
+        this->Log->appendPlainText(QString::fromStdString(line));
+      }
+    }
     if (this->Replaying)
     {
       const auto [compared, equal] = this->Engine->ReplayHashes();
@@ -502,7 +509,8 @@ void SessionWindow::ShowScene()
   const WallTopology& topology = this->World.wall->Topology();
   this->Instruments->ShowMoment(this->Now, topology);
   this->Contrast->ShowBalance(this->Now.contrast);
-  this->Metrics->ShowMetrics(this->Now.metrics, topology);
+  this->Metrics->ShowMetrics(
+    this->Now.metrics, topology, NextOf(this->World.scenario.procedure, this->Now.procedure));
   this->View->Follow(this->Now.pose, this->Now.input.table);
   this->ShowDevices();
   this->Monitor->SetState(this->Now, this->Shown.completeness, this->XRay->Mode());

@@ -5,6 +5,7 @@
 #include "SessionImager.h"
 #include "SimulatorRun.h"
 #include "VesselTestData.h"
+#include "XmlText.h"
 
 #include "vtkXMLPolyDataReader.h"
 
@@ -12,6 +13,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
@@ -289,9 +291,14 @@ TEST_F(TestCoronarySimulator, RefusesWrongImagesAndContrast)
   }
 }
 
-TEST_F(TestCoronarySimulator, CineRunsBecomeDicomFiles)
+TEST_F(TestCoronarySimulator, CineRunsBecomeDicomFilesAndAReport)
 {
-  this->Put("s.json", TestScenario());
+  json asked = TestScenario();
+  asked["procedure"] =
+    json::array({ { { "text", "Show <it> & well" }, { "goal", "angiogram" }, { "views", 1 } },
+      { { "text", "Turn back" }, { "goal", "wire_back" } },
+      { { "text", "Show more" }, { "goal", "angiogram" }, { "views", 2 } } });
+  this->Put("s.json", asked);
   const auto pieces = [this](const json& list)
   {
     this->Put("cine.json",
@@ -300,8 +307,10 @@ TEST_F(TestCoronarySimulator, CineRunsBecomeDicomFiles)
   const auto hold = [](double seconds, const char* pedal) {
     return json{ { "seconds", seconds }, { "pedals", { pedal } } };
   };
-  pieces(
-    { hold(0.2, "fluoroscopy"), hold(0.4, "cine"), hold(0.2, "fluoroscopy"), hold(0.3, "cine") });
+  json injection = hold(0.4, "cine");
+  injection["inject_mL"] = 3;
+  pieces(json::array(
+    { hold(0.2, "fluoroscopy"), injection, hold(0.2, "fluoroscopy"), hold(0.3, "cine") }));
   const std::string session = "--headless --scenario s.json --xray --script cine.json --output ";
   ASSERT_EQ(this->Run(session + "a"), 0) << this->Said();
   // Each frame is the one that was shown.
@@ -341,6 +350,39 @@ TEST_F(TestCoronarySimulator, CineRunsBecomeDicomFiles)
         << run << ", " << frame;
     }
   }
+  // What was asked for, and how well it was done.
+  const json procedure = this->Statistics("a")["procedure"];
+  ASSERT_EQ(procedure["steps"].size(), 3U);
+  EXPECT_GT(procedure["steps"][0]["seconds"].get<double>(), 0.2);
+  EXPECT_LT(procedure["steps"][0]["seconds"].get<double>(), 0.65);
+  EXPECT_FALSE(procedure["steps"][1]["seconds"].is_null());
+  EXPECT_TRUE(procedure["steps"][2]["seconds"].is_null());
+  EXPECT_FALSE(procedure["passed"].get<bool>());
+  double points = 100.0;
+  for (const json& item : procedure["items"])
+  {
+    points -= std::min(
+      item["most"].get<double>(), item["weight"].get<double>() * item["amount"].get<double>());
+  }
+  EXPECT_NEAR(procedure["points"].get<double>(), points, 1e-9);
+  EXPECT_NE(this->Said().find("Step 1 of 3 is done: Show <it> & well."), std::string::npos);
+  EXPECT_NE(
+    ReadText(this->Folder / "stdout").find("Failed: not done: Show more."), std::string::npos);
+  std::string page = ReadText(this->Folder / "a/report.html");
+  EXPECT_NE(page.find("Show &lt;it&gt; &amp; well"), std::string::npos);
+  EXPECT_NE(page.find("Failed: not done: Show more"), std::string::npos);
+  page.erase(0, page.find('\n') + 1); // the document type
+  std::size_t pictures = 0;
+  coronary::ReadXml(page, "report.html",
+    [&](const coronary::XmlElement& element)
+    {
+      if (element.Name() == "img")
+      {
+        ++pictures;
+        EXPECT_TRUE(fs::exists(this->Folder / "a" / element.Required("src")));
+      }
+    });
+  EXPECT_EQ(pictures, 2U);
   // A session in the same folder takes the place of these.
   pieces(json::array({ hold(0.1, "fluoroscopy") }));
   ASSERT_EQ(this->Run(session + "a"), 0) << this->Said();
@@ -580,8 +622,8 @@ TEST_F(TestCoronarySimulator, NamesTheProgramForPosing)
 TEST_F(TestCoronarySimulator, PrintsWhatItKnows)
 {
   ASSERT_EQ(this->Run("--list-scenarios"), 0);
-  for (const char* name : { "phantom-lca", "phantom-rca", "hra-lca", "lad-lesion", "lad-stent",
-         "patient-lca", "patient-rca" })
+  for (const char* name : { "phantom-lca", "phantom-rca", "hra-lca", "angiogram-lca", "lad-lesion",
+         "lad-stent", "patient-lca", "patient-rca" })
   {
     EXPECT_NE(ReadText(this->Folder / "stdout").find(name), std::string::npos);
   }

@@ -2,6 +2,7 @@
 #include "CArm.h"
 
 #include "CounterRandom.h"
+#include "Numbers.h"
 #include "Refusals.h"
 #include "XRayTestScenes.h"
 
@@ -148,4 +149,19 @@ TEST(CArm, RefusesWhatIsNoCArm)
   ExpectRefusal([&] { with([](auto& p, auto&) { p.sourceToDetector = 700.0; }); }, "detector");
   ExpectRefusal([&] { with([](auto&, auto& f) { f.columns = 0; }); }, "columns");
   ExpectRefusal([&] { with([](auto&, auto& f) { f.height = -1.0; }); }, "height");
+}
+
+TEST(CArm, ViewsHaveTheirNames)
+{
+  CArmPose pose;
+  EXPECT_EQ(ViewName(pose), "AP");
+  pose.primary = -30.2 * Degree;
+  EXPECT_EQ(ViewName(pose), "RAO 30");
+  pose.secondary = 19.6 * Degree;
+  EXPECT_EQ(ViewName(pose), "RAO 30 CRA 20");
+  pose.primary = 45.0 * Degree;
+  pose.secondary = -25.0 * Degree;
+  EXPECT_EQ(ViewName(pose), "LAO 45 CAU 25");
+  // Which is where the beam goes.
+  EXPECT_LT((BeamDirection(pose) - CArmGeometry(pose, {}).TowardsDetector()).norm(), 1e-12);
 }

@@ -29,6 +29,7 @@ XrayAngiogram SmallRun()
 {
   XrayAngiogram run;
   run.patient = "Ph\xc3\xa4ntom^\\one";
+  run.view = "RAO 30 CRA 20";
   run.program = "test 1";
   run.study = 77;
   run.run = 2;
@@ -124,7 +125,7 @@ TEST_F(CineFiles, GdcmReadsWhatWasWritten)
     { { 0x0008, 0x0060 }, "XA" },
     { { 0x0008, 0x0008 }, "ORIGINAL\\PRIMARY\\SINGLE PLANE" },
     { { 0x0010, 0x0010 }, "Simulated^Ph\xc3\xa4ntom  one" }, // no separators of DICOM
-    { { 0x0008, 0x103e }, "RAO 30 CRAN 20" },
+    { { 0x0008, 0x103e }, "RAO 30 CRA 20" },
     { { 0x0018, 0x1063 }, "66.666667" },
     { { 0x0018, 0x1110 }, "1100" },
     { { 0x0018, 0x1111 }, "800" },

@@ -68,7 +68,7 @@ public:
 TEST(UnitTestScenario, BuiltInOnesAreGood)
 {
   const auto list = coronary::BuiltInScenarios();
-  ASSERT_EQ(list.size(), 7U);
+  ASSERT_EQ(list.size(), 8U);
   for (const auto& one : list)
   {
     const Scenario scenario = LoadScenario(one.name);
@@ -121,7 +121,42 @@ TEST(UnitTestScenario, TextSaysEverythingToTheBit)
     EXPECT_EQ(again.balloon.has_value(), scenario.balloon.has_value());
     EXPECT_EQ(again.exchanges.size(), scenario.exchanges.size());
     EXPECT_EQ(again.lesions.size(), scenario.lesions.size());
+    ASSERT_EQ(again.procedure.size(), scenario.procedure.size());
+    for (std::size_t n = 0; n < scenario.procedure.size(); ++n)
+    {
+      EXPECT_EQ(again.procedure[n].goal, scenario.procedure[n].goal);
+      EXPECT_EQ(again.procedure[n].text, scenario.procedure[n].text);
+      EXPECT_EQ(again.procedure[n].value, scenario.procedure[n].value);
+    }
   }
+}
+
+TEST(UnitTestScenario, StepsOfAProcedure)
+{
+  json text = json::parse(ScenarioText(LoadScenario("lad-stent")));
+  const auto with = [&](const json& step)
+  {
+    text["procedure"] = json::array({ step });
+    return ScenarioFromText(text.dump(), "'file'", ".");
+  };
+  const Scenario scenario = with({ { "text", "go" }, { "goal", "wire_in" }, { "vessel", "dLAD" } });
+  ASSERT_EQ(scenario.procedure.size(), 1U);
+  EXPECT_EQ(scenario.procedure[0].goal, coronary::ProcedureStep::Goal::WireIn);
+  EXPECT_EQ(scenario.procedure[0].vessel, "dLAD");
+  ExpectRefusal(
+    [&] {
+      with({ { "text", "go" }, { "goal", "fly" } });
+    },
+    "'file', step 1", "'fly' is none of angiogram, wire_in");
+  ExpectRefusal([&] { with({ { "text", "go" }, { "goal", "wire_in" } }); }, "'vessel'");
+  ExpectRefusal([&] { with({ { "text", "go" }, { "goal", "stenosis_below" } }); }, "'percent'");
+  ExpectRefusal(
+    [&] {
+      with({ { "text", "go" }, { "goal", "stenosis_below" }, { "percent", 120 } });
+    },
+    "'percent'");
+  ExpectRefusal([&] { with({ { "goal", "wire_back" } }); }, "'text'");
+  ExpectRefusal([&] { with({ { "text", "go" }, { "goal", "wire_back" }, { "mm", 3 } }); }, "'mm'");
 }
 
 TEST(UnitTestScenario, EverySettingArrives)

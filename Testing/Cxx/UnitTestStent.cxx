@@ -525,9 +525,10 @@ TEST(Stent, TheRecordedDeploymentRepeatsToTheBit)
   auto source =
     std::make_unique<ReplaySource>(std::string(DYNAMICCORONARY_DRIVING) + "/lad-stent.pcirec");
   const ReplaySource* replay = source.get();
-  const Scenario scenario =
-    ScenarioFromText(source->Reader().Header().scenario, "The recording", ".");
+  Scenario scenario = ScenarioFromText(source->Reader().Header().scenario, "The recording", ".");
   ASSERT_TRUE(scenario.balloon && scenario.balloon->stent);
+  // (It was recorded before scenarios had procedures.)
+  scenario.procedure = LoadScenario("lad-stent").procedure;
   const Played played(scenario, std::move(source));
   const TrainingSession& session = played.Runner.Session();
   EXPECT_EQ(replay->Reader().HowEnded(), RecordingReader::Ending::Complete);
@@ -562,6 +563,27 @@ TEST(Stent, TheRecordedDeploymentRepeatsToTheBit)
   EXPECT_NE(played.Said.find("The balloon 'non-compliant-3.5x12' is taken."), std::string::npos)
     << played.Said;
   EXPECT_NE(played.Said.find("The stent of 'stent-3.0x18' lies in mLAD"), std::string::npos);
+  // All steps were done, and in time; the hands were those of somebody who looks away.
+  const std::vector<double>& reached = session.Procedure().reached;
+  ASSERT_EQ(reached.size(), scenario.procedure.size()) << NextOf(scenario.procedure, { reached });
+  EXPECT_GT(reached[0], 8.2);
+  EXPECT_LT(reached[1], 9.8);
+  EXPECT_GT(reached[2], 12.7);
+  EXPECT_LT(reached[2], 16.0);
+  EXPECT_GT(reached[4], 34.9);
+  EXPECT_NE(played.Said.find("Step 3 of 5 is done: Open the stent"), std::string::npos);
+  const ProcedureScore score = session.Score();
+  EXPECT_TRUE(score.passed);
+  EXPECT_GT(session.Metrics().blindTravel, 80.0);
+  EXPECT_LT(session.Metrics().blindTravel, session.Metrics().wireTravel);
+  EXPECT_GT(session.Metrics().occludedSeconds, 2.0);
+  EXPECT_LT(session.Metrics().occludedSeconds, 20.0);
+  double lost = 0.0;
+  for (const ScoreItem& item : score.items)
+  {
+    lost += std::min(item.most, item.weight * item.amount);
+  }
+  EXPECT_NEAR(score.points, 100.0 - lost, 1e-9);
 }
 
 // The same hands with a stent that is too short and too narrow, and a balloon that is too wide.
