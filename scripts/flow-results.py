@@ -42,6 +42,21 @@ def shear(case):
     return DENSITY * size, 0.5 * (1.0 - numpy.linalg.norm(mean, axis=1) / numpy.maximum(size, 1e-300))
 
 
+def control(case, pattern):
+    with open(os.path.join(case, "system", "controlDict"), encoding="utf-8") as file:
+        return float(re.search(pattern, file.read(), re.M).group(1))
+
+
+def unrest(case, begin):
+    """Wall shear at the end of the cycle less that at its beginning, over the latter (root mean squares); None: not written."""
+    times = foam_case.times_of(case)
+    first = min(times, key=lambda time: abs(float(time) - begin))
+    if abs(float(first) - begin) > 1e-6 or first == times[-1]:
+        return None
+    fields = [foam_case.patch_field(case, time, "wallShearStress", "wall", 3) for time in (first, times[-1])]
+    return numpy.linalg.norm(fields[1] - fields[0]) / numpy.linalg.norm(fields[0])
+
+
 def draw(cases, path):
     import matplotlib
     matplotlib.use("Agg")
@@ -81,14 +96,15 @@ def main():
     text = "%-42s %12s %12s %11s\n" % ("", "moving", "at rest", "change")
     loss = {}
     for label, case in cases.items():
-        with open(os.path.join(case, "system", "controlDict"), encoding="utf-8") as file:
-            step = float(re.search(r"^deltaT (\S+);", file.read(), re.M).group(1))
+        step = control(case, r"^deltaT (\S+);")
+        begin = control(case, r"timeStart (\S+);") - 0.5 * step
         times, values = losses(case)
-        late = times > max(0.0, times[-1] - 1.0)
         # The first steps are an impulse.
-        late[:min(5, len(late) - 1)] = False
+        late = (times > begin) & (times > min(5.5, len(times) - 0.5) * step)
         loss[label] = {name: value[late].mean() for name, value in values.items()}
-        text += "%s: %d steps of %g s, to %g s\n" % (label, len(times), step, times[-1])
+        text += "%s: %d steps of %g s, to %g s; the cycle begins at %g s" % (label, len(times), step, times[-1], begin)
+        rest = unrest(case, begin)
+        text += "\n" if rest is None else ", wall shear is %.2f %% off at its end\n" % (100.0 * rest)
     for name in loss["moving"]:
         text += line("mean loss to %s, mmHg" % name, loss["moving"][name], loss["rest"][name])
     fields = {label: shear(case) for label, case in cases.items()}

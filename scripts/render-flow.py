@@ -95,9 +95,16 @@ def frame_of(patch):
 
 
 def along_inlet(blocks, reach):
-    """A plane along the vessel at the inlet, its normal, the direction into the vessel, the inlet's radius, and a place so many radii inside."""
+    """A plane along the vessel at the inlet, in which it bends; the plane's normal, the direction into the vessel, the inlet's radius, and a
+    place so many radii inside."""
     centre, normal, across, radius = frame_of(blocks["inlet"])
     inwards = normal * numpy.sign((numpy.array(blocks["internalMesh"].GetCenter()) - centre).dot(normal))
+    ways = vtk_to_numpy(blocks["wall"].GetPoints().GetData()).astype(float) - centre
+    distances = numpy.linalg.norm(ways, axis=1) / radius
+    way = ways[(distances > reach) & (distances < 2.0 * reach)].mean(axis=0)
+    bend = numpy.cross(inwards, way)
+    if numpy.linalg.norm(bend) > 0.05 * numpy.linalg.norm(way):
+        across = bend / numpy.linalg.norm(bend)
     plane = vtkPlane()
     plane.SetOrigin(*centre)
     plane.SetNormal(*across)

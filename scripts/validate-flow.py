@@ -99,7 +99,7 @@ def womersley(arguments, result):
 
 
 def moving(arguments, result):
-    options = ("--length", "12", "--layers", "4", "--steps", "100", "--frames", "100")
+    options = ("--length", "12", "--layers", "4", "--steps", "200", "--frames", "200")
     values = []
     centres = None
     for kind in ("rest", "moving"):
@@ -119,7 +119,7 @@ def moving(arguments, result):
 
 
 def pulsing(arguments, result):
-    case, tube = solve(arguments, "pulsing", "--length", "8", "--layers", "3", "--steps", "100", "--frames", "100")
+    case, tube = solve(arguments, "pulsing", "--length", "8", "--layers", "3", "--steps", "200", "--frames", "200")
     mesh = foam_case.Mesh(case)
     times, out = foam_case.series(case, "flow_outlet")
     into = foam_case.series(case, "flow_inlet")[1]
