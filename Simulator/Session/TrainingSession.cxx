@@ -220,10 +220,10 @@ void TrainingSession::Internals::MeasureHands(const SessionInput& input)
   }
   const auto values = [](const SessionInput& hands)
   {
-    return std::array<double, 11>{ hands.drive.wirePosition, hands.drive.wireAngle,
+    return std::array<double, 13>{ hands.drive.wirePosition, hands.drive.wireAngle,
       hands.drive.catheterPosition, hands.drive.catheterAngle, hands.drive.balloonPosition,
       hands.drive.inflation, hands.syringe, hands.primary, hands.secondary, hands.sourceToDetector,
-      hands.table.sum() };
+      hands.table.x(), hands.table.y(), hands.table.z() };
   };
   if (!radiates || values(input) != values(this->Last))
   {
