@@ -51,5 +51,6 @@ def open_series():
 def wait():
     """Until the model is built and its frames are ready."""
     live(3600.0, lambda: simple.FindSource("Wall in the slice"))
+    live(60.0, lambda: any(view.UseCache for view in simple.GetRenderViews()))
     live(3600.0, lambda: not any(view.UseCache for view in simple.GetRenderViews()))
     live(2.0)
