@@ -301,7 +301,7 @@ std::string Solution(const FoamCase& flow)
         // Of the flux before the pressure's own corrections, which decide.
         Block("\"pcorr.*\"",
           Entry("solver", "GAMG", 2) + Entry("smoother", "GaussSeidel", 2) +
-            Entry("tolerance", "1e-7", 2) + Entry("relTol", "0", 2),
+            Entry("tolerance", "1e-5", 2) + Entry("relTol", "0", 2),
           1) +
         Block("U", smooth("0.05"), 1) + Block("UFinal", smooth("0"), 1) +
         Block("cellDisplacement",
