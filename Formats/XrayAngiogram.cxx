@@ -94,6 +94,16 @@ public:
     this->Bytes(group, element, type, value.data(), value.size());
   }
 
+  void Decimals(std::uint16_t group, std::uint16_t element, const std::vector<double>& values)
+  {
+    std::string text;
+    for (const double value : values)
+    {
+      text += (text.empty() ? "" : "\\") + Decimal(value);
+    }
+    this->Text(group, element, gdcm::VR::DS, text);
+  }
+
   void Numbers(std::uint16_t group, std::uint16_t element, const std::vector<std::uint16_t>& values)
   {
     std::string bytes;
@@ -120,24 +130,14 @@ private:
 
 /// A value of each frame less that of the first.
 template <typename Value>
-std::string Increments(const XrayAngiogram& run, const Value& value)
+std::vector<double> Increments(const XrayAngiogram& run, const Value& value)
 {
-  std::string text;
+  std::vector<double> increments;
   for (const XrayAngiogram::Frame& frame : run.frames)
   {
-    text += (text.empty() ? "" : "\\") + Decimal(value(frame) - value(run.frames.front()));
+    increments.push_back(value(frame) - value(run.frames.front()));
   }
-  return text;
-}
-
-double PrimaryOf(const XrayAngiogram::Frame& frame)
-{
-  return frame.primary;
-}
-
-double SecondaryOf(const XrayAngiogram::Frame& frame)
-{
-  return frame.secondary;
+  return increments;
 }
 
 /// Since the frame before, ms.
@@ -227,12 +227,7 @@ void AddAcquisition(DataSetWriter& data, const XrayAngiogram& run)
   }
   else
   {
-    std::string times;
-    for (const double interval : Intervals(run))
-    {
-      times += (times.empty() ? "" : "\\") + Decimal(interval);
-    }
-    data.Text(0x0018, 0x1065, VR::DS, times);
+    data.Decimals(0x0018, 0x1065, Intervals(run));
   }
   data.Text(0x0018, 0x1110, VR::DS, Decimal(run.sourceToDetector));
   data.Text(0x0018, 0x1111, VR::DS, Decimal(run.sourceToIsocentre));
@@ -244,8 +239,7 @@ void AddAcquisition(DataSetWriter& data, const XrayAngiogram& run)
   data.Text(0x0018, 0x1152, VR::IS, "");
   data.Text(0x0018, 0x1155, VR::CS, "GR");
   data.Text(0x0018, 0x115e, VR::DS, Decimal(DecigrayPerGray * run.areaDose));
-  data.Text(0x0018, 0x1164, VR::DS,
-    Decimal(run.height / run.rows) + "\\" + Decimal(run.width / run.columns));
+  data.Decimals(0x0018, 0x1164, { run.height / run.rows, run.width / run.columns });
   const bool turns = AnyFrame(run,
     [&](const XrayAngiogram::Frame& frame)
     {
@@ -259,20 +253,21 @@ void AddAcquisition(DataSetWriter& data, const XrayAngiogram& run)
   if (slides)
   {
     // The table goes the other way than the isocentre in the patient. Positive: down, to the patient's left, to the head.
-    data.Text(0x0018, 0x1135, VR::DS,
-      Increments(run, [](const XrayAngiogram::Frame& frame) { return -frame.isocentre.y(); }));
-    data.Text(0x0018, 0x1136, VR::DS,
-      Increments(run, [](const XrayAngiogram::Frame& frame) { return -frame.isocentre.x(); }));
-    data.Text(0x0018, 0x1137, VR::DS,
-      Increments(run, [](const XrayAngiogram::Frame& frame) { return -frame.isocentre.z(); }));
+    data.Decimals(
+      0x0018, 0x1135, Increments(run, [](const auto& frame) { return -frame.isocentre.y(); }));
+    data.Decimals(
+      0x0018, 0x1136, Increments(run, [](const auto& frame) { return -frame.isocentre.x(); }));
+    data.Decimals(
+      0x0018, 0x1137, Increments(run, [](const auto& frame) { return -frame.isocentre.z(); }));
   }
   data.Text(0x0018, 0x1500, VR::CS, turns ? "DYNAMIC" : "STATIC");
   data.Text(0x0018, 0x1510, VR::DS, Decimal(first.primary));
   data.Text(0x0018, 0x1511, VR::DS, Decimal(first.secondary));
   if (turns)
   {
-    data.Text(0x0018, 0x1520, VR::DS, Increments(run, PrimaryOf));
-    data.Text(0x0018, 0x1521, VR::DS, Increments(run, SecondaryOf));
+    data.Decimals(0x0018, 0x1520, Increments(run, [](const auto& frame) { return frame.primary; }));
+    data.Decimals(
+      0x0018, 0x1521, Increments(run, [](const auto& frame) { return frame.secondary; }));
   }
 }
 

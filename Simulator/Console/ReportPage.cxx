@@ -51,26 +51,17 @@ std::string Cell(const std::string& text, bool number = false)
   return (number ? "<td class=\"number\">" : "<td>") + EscapedXml(text) + "</td>";
 }
 
-std::string HeadCells(const std::vector<std::string>& names, std::size_t texts)
-{
-  std::string row = "<tr>";
-  for (std::size_t n = 0; n < names.size(); ++n)
-  {
-    row += (n < texts ? "<th>" : "<th class=\"number\">") + EscapedXml(names[n]) + "</th>";
-  }
-  return row + "</tr>\n";
-}
-
 /// A row for each object, a column for each pair of heading and member; the first ones are texts.
 std::string Table(const Json& list, const std::vector<std::pair<std::string, const char*>>& columns,
   std::size_t texts)
 {
-  std::vector<std::string> names;
-  for (const auto& [name, member] : columns)
+  std::string table = "<table>\n<tr>";
+  for (std::size_t n = 0; n < columns.size(); ++n)
   {
-    names.push_back(name);
+    table +=
+      (n < texts ? "<th>" : "<th class=\"number\">") + EscapedXml(columns[n].first) + "</th>";
   }
-  std::string table = "<table>\n" + HeadCells(names, texts);
+  table += "</tr>\n";
   for (const Json& one : list)
   {
     table += "<tr>";

@@ -32,7 +32,7 @@ void CineRuns::Add(const SessionSnapshot& moment, const GreyImage& image, ImageM
   const XrayAngiogram* last = this->Open ? &this->Runs_.back() : nullptr;
   // A file has images of one size and kind.
   const bool goesOn = last && moment.exposure.run == this->LastRun &&
-    moment.fieldOfView == this->LastField && last->columns == image.columns &&
+    moment.fieldOfView == last->width && last->columns == image.columns &&
     last->rows == image.rows && last->subtracted == subtracted &&
     last->sourceToDetector == moment.pose.sourceToDetector;
   if (!goesOn)
@@ -82,7 +82,6 @@ void CineRuns::Begin(const SessionSnapshot& moment, const GreyImage& image, bool
   run.iodine = this->Iodine;
   this->LastRun = moment.exposure.run;
   this->LastPart = run.part;
-  this->LastField = moment.fieldOfView;
   this->Runs_.push_back(std::move(run));
   this->Open = true;
 }

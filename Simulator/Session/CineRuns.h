@@ -55,8 +55,7 @@ private:
   std::int64_t LastRun = 0;
   int LastPart = 0;
   double LastPhase = 0.0;
-  double LastField = 0.0; ///< mm
-  double LastDose = 0.0;  ///< Gy cm^2
+  double LastDose = 0.0; ///< Gy cm^2
   std::size_t Stored = 0;
 };
 

@@ -204,7 +204,7 @@ TEST_F(FoamCases, AStoppedCaseWithMovingWallsGoesOn)
   {
     EXPECT_NEAR(row(ends[k], "0.004"), whole[k], 1e-6 * std::abs(whole[k])) << ends[k];
   }
-  // Stopped again before a picture is there.
+  // A finished case has nothing left to do.
   ASSERT_EQ(solve(8), 0) << ReadText(this->Folder / "log.solver");
 }
 
