@@ -708,7 +708,21 @@ protected:
     const Image& image = this->Slices[static_cast<std::size_t>(k)][static_cast<std::size_t>(phase)];
     plane.slope = image.frame->slope;
     plane.intercept = image.frame->intercept;
-    plane.type = this->Pixels.Read(*image.file, image.frameIndex, plane.bytes);
+    if (image.file->frames.size() == 1)
+    {
+      plane.type = DicomPixelReader().Read(*image.file, image.frameIndex, plane.bytes);
+    }
+    else
+    {
+      plane.type = this->Pixels.Read(*image.file, image.frameIndex, plane.bytes);
+    }
+  }
+
+  bool HasSeparatePlanes(int phase) const override
+  {
+    return std::all_of(this->Slices.begin(), this->Slices.end(),
+      [phase](const auto& slice)
+      { return slice[static_cast<std::size_t>(phase)].file->frames.size() == 1; });
   }
 
   void EndOfVolume() override { this->Pixels.Close(); }
@@ -720,7 +734,7 @@ private:
 
   std::vector<DicomFile> All;
   Stack Slices;
-  DicomPixelReader Pixels;
+  DicomPixelReader Pixels; ///< of files of several frames
 };
 
 Files DicomSeries::Select(const std::string& folder, const std::string& seriesUid)

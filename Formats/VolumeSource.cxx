@@ -2,6 +2,7 @@
 
 #include <Eigen/SVD>
 
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -133,32 +134,61 @@ bool VolumeSource::ReadPlanes(
 
   const auto rowLength = static_cast<std::size_t>(extent[1] - extent[0] + 1);
   const auto wholeRow = static_cast<std::size_t>(whole[1] - whole[0] + 1);
-  Plane plane;
-  double done = 0.0;
-  const Poll poll = [&progress, &done] { Report(progress, done); };
-  for (int k = extent[4]; k <= extent[5]; ++k)
+  const auto rows = static_cast<std::size_t>(extent[3] - extent[2] + 1);
+  const int count = extent[5] - extent[4] + 1;
+  // False: a value that has no place in T.
+  const auto readInto = [&](int n, Plane& plane, const Poll& poll)
   {
-    done = static_cast<double>(k - extent[4]) / (extent[5] - extent[4] + 1);
-    poll();
-    this->ReadPlane(phase, k, plane, poll);
+    this->ReadPlane(phase, extent[4] + n, plane, poll);
     const std::size_t size = VoxelBytes(plane.type);
-    for (int j = extent[2]; j <= extent[3]; ++j)
+    T* to = values + static_cast<std::size_t>(n) * rows * rowLength;
+    for (int j = extent[2]; j <= extent[3]; ++j, to += rowLength)
     {
       const std::size_t first = static_cast<std::size_t>(j) * wholeRow + extent[0];
       const unsigned char* bytes = plane.bytes.data() + first * size;
       const bool good = VisitVoxel(plane.type,
-        [&](auto stored) {
-          return Convert<decltype(stored)>(bytes, rowLength, plane.slope, plane.intercept, values);
-        });
+        [&](auto stored)
+        { return Convert<decltype(stored)>(bytes, rowLength, plane.slope, plane.intercept, to); });
       if (!good)
       {
         return false;
       }
-      values += rowLength;
     }
+    return true;
+  };
+  std::atomic<bool> good{ true };
+  if (this->HasSeparatePlanes(phase))
+  {
+    ParallelFor(
+      count, 1,
+      [&](std::int64_t first, std::int64_t last)
+      {
+        Plane plane;
+        for (std::int64_t n = first; n < last && good; ++n)
+        {
+          if (!readInto(static_cast<int>(n), plane, [] {}))
+          {
+            good = false;
+          }
+        }
+      },
+      progress);
+    return good;
   }
-  Report(progress, 1.0);
-  return true;
+  Plane plane;
+  double done = 0.0;
+  const Poll poll = [&progress, &done] { Report(progress, done); };
+  for (int n = 0; n < count && good; ++n)
+  {
+    done = static_cast<double>(n) / count;
+    poll();
+    good = readInto(n, plane, poll);
+  }
+  if (good)
+  {
+    Report(progress, 1.0);
+  }
+  return good;
 }
 
 bool VolumeSource::Read(

@@ -114,6 +114,9 @@ protected:
   /// Fills the plane k of a phase; `plane` may keep its buffer from call to call.
   virtual void ReadPlane(int phase, int k, Plane& plane, const Poll& poll) = 0;
 
+  /// Whether ReadPlane may be called from several threads at once, for planes of this phase.
+  virtual bool HasSeparatePlanes(int /*phase*/) const { return false; }
+
   /// Called after the last plane of a Read, also when it failed: closes what need not stay open.
   virtual void EndOfVolume() {}
 

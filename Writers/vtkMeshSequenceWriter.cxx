@@ -3,6 +3,7 @@
 #include "ItemSharing.h"
 #include "MeshSequenceReport.h"
 #include "Numbers.h"
+#include "ParallelFor.h"
 #include "PartialProgress.h"
 #include "vtkCoronaryArrayNames.h"
 #include "vtkCoronaryFilterParts.h"
@@ -21,6 +22,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <filesystem>
 #include <future>
 #include <memory>
@@ -36,6 +38,8 @@ vtkStandardNewMacro(vtkMeshSequenceWriter);
 
 namespace
 {
+constexpr int MostAtOnce = 4; ///< phases whose files are packed: each is held in memory meanwhile
+
 /// As the report counts them.
 std::string PhaseName(std::size_t phase, double time)
 {
@@ -305,7 +309,7 @@ private:
   vtkMeshSequence::PhaseMesh Measure(std::size_t k, vtkPointSet* mesh) const;
   std::string WritePhase(std::size_t k);
   void BeginToWrite(std::shared_ptr<const vtkMeshSequence::PhaseMesh> phase);
-  void WaitForFiles();
+  void WaitForFiles(int left = 0);
   void TakePhase(const std::string& bytes, coronary::MeshSequenceReport::Phase& entry);
   void Finish();
 
@@ -323,8 +327,8 @@ private:
   std::unique_ptr<vtkMeshSequence::Files> Files;
   std::vector<std::unique_ptr<vtkMeshSequence::Format>> Formats;
   std::size_t Collected = 0; ///< phases
-  /// The files of one phase, while the next one is moved; last, so that it ends before what it uses.
-  std::future<void> Writing;
+  /// The files of phases, while the next one is moved; last, so that they end before what they use.
+  std::deque<std::future<void>> Writing;
 };
 
 vtkMeshSequenceWriter::Run::Run(vtkMeshSequenceWriter* self, vtkInformation* info)
@@ -484,12 +488,11 @@ std::string vtkMeshSequenceWriter::Run::WritePhase(std::size_t k)
   this->CollectBefore(k + 1);
   const auto phase = std::make_shared<const vtkMeshSequence::PhaseMesh>(this->Measure(k, mesh));
   coronary::Report(this->Progress, (static_cast<double>(k) + 0.5) / count);
-  this->WaitForFiles();
-  const std::size_t before = this->Folder->Added().size();
-  this->BeginToWrite(phase);
   std::vector<char> names;
   if (this->Sharing.AtOnce() > 1)
   {
+    const std::size_t before = this->Folder->Added().size();
+    this->BeginToWrite(phase);
     this->WaitForFiles();
     for (std::size_t n = before; n < this->Folder->Added().size(); ++n)
     {
@@ -497,6 +500,11 @@ std::string vtkMeshSequenceWriter::Run::WritePhase(std::size_t k)
       names.insert(names.end(), name.begin(), name.end());
       names.push_back('\n');
     }
+  }
+  else
+  {
+    this->WaitForFiles(std::min(MostAtOnce, coronary::NumberOfThreads()) - 1);
+    this->BeginToWrite(phase);
   }
   return coronary::Packed(NumbersOf(*phase), names);
 }
@@ -519,25 +527,28 @@ void vtkMeshSequenceWriter::Run::TakePhase(
   }
 }
 
-/// Beside what comes next: packing the files takes longer than moving the mesh, and one thread only.
+/// Beside what comes next: packing the files takes longer than moving the mesh, and one thread for each phase.
 void vtkMeshSequenceWriter::Run::BeginToWrite(
   std::shared_ptr<const vtkMeshSequence::PhaseMesh> phase)
 {
-  this->Writing = std::async(std::launch::async,
+  this->Writing.push_back(std::async(std::launch::async,
     [this, phase]
     {
       for (const auto& format : this->Formats)
       {
         format->Write(*phase);
       }
-    });
+    }));
 }
 
-void vtkMeshSequenceWriter::Run::WaitForFiles()
+/// Until the files of no more than so many phases are being written.
+void vtkMeshSequenceWriter::Run::WaitForFiles(int left)
 {
-  if (this->Writing.valid())
+  while (static_cast<int>(this->Writing.size()) > left)
   {
-    this->Writing.get();
+    std::future<void> first = std::move(this->Writing.front());
+    this->Writing.pop_front();
+    first.get();
   }
 }
 
@@ -583,9 +594,9 @@ void vtkMeshSequenceWriter::Run::WriteAll()
   }
   catch (const std::exception& error)
   {
-    if (this->Writing.valid())
+    for (const std::future<void>& files : this->Writing)
     {
-      this->Writing.wait();
+      files.wait();
     }
     try
     {

@@ -69,10 +69,14 @@ void RemoveWeights(vtkPointData* data)
   }
 }
 
-std::string XmlOf(vtkDataSet* data)
+std::string XmlOf(vtkDataSet* shared)
 {
+  // VTK's writer keeps in each array what its range is, and phases that are packed beside each other share arrays.
+  vtkSmartPointer<vtkDataSet> data;
+  data.TakeReference(shared->NewInstance());
+  data->DeepCopy(shared);
   vtkSmartPointer<vtkXMLUnstructuredDataWriter> writer;
-  if (vtkPolyData::SafeDownCast(data))
+  if (vtkPolyData::SafeDownCast(shared))
   {
     writer = vtkSmartPointer<vtkXMLPolyDataWriter>::New();
   }
@@ -269,6 +273,10 @@ public:
     : Format(files)
     , Unit(unit)
   {
+    for (const auto& face : files.faces)
+    {
+      this->Faces.emplace(face.id, files.topology.PatchOf(face.id));
+    }
   }
 
   void Name(std::size_t phase, double, coronary::MeshSequenceReport::Phase& entry) override
@@ -285,8 +293,8 @@ private:
       "/mesh-complete";
   }
 
-  const double Unit;          ///< mm
-  std::map<int, Patch> Faces; ///< made when they are first written
+  const double Unit; ///< mm
+  std::map<int, Patch> Faces;
 };
 
 /// One file of all phases.
@@ -468,12 +476,7 @@ void SimVascularFolders::Write(const PhaseMesh& phase)
     XmlOf(FaceOf(topology, phase, shared.surface, this->Unit)));
   for (const auto& face : shared.faces)
   {
-    auto patch = this->Faces.find(face.id);
-    if (patch == this->Faces.end())
-    {
-      patch = this->Faces.emplace(face.id, topology.PatchOf(face.id)).first;
-    }
-    const std::string text = XmlOf(FaceOf(topology, phase, patch->second, this->Unit));
+    const std::string text = XmlOf(FaceOf(topology, phase, this->Faces.at(face.id), this->Unit));
     shared.Write(folder + "/mesh-surfaces/" + face.name + ".vtp", text);
     if (face.id == WallId)
     {
@@ -552,7 +555,12 @@ std::string Files::Number(std::size_t phase) const
 
 void Files::Write(const std::string& file, const std::string& bytes)
 {
-  coronary::WriteFileAtomically(this->Folder.Add(file), bytes);
+  std::string path;
+  {
+    const std::lock_guard<std::mutex> lock(this->Adding);
+    path = this->Folder.Add(file);
+  }
+  coronary::WriteFileAtomically(path, bytes);
 }
 
 std::vector<std::unique_ptr<Format>> MakeFormats(

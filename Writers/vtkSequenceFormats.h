@@ -12,6 +12,7 @@
 #include <vtkSmartPointer.h>
 
 #include <memory>
+#include <mutex>
 #include <utility>
 
 namespace vtkMeshSequence
@@ -38,6 +39,7 @@ public:
     coronary::StagedFolder& to);
 
   std::string Number(std::size_t phase) const;
+  /// From any thread.
   void Write(const std::string& file, const std::string& bytes);
   bool IsOwner() const { return this->Folder.IsOwner(); }
 
@@ -51,11 +53,12 @@ public:
 
 private:
   coronary::StagedFolder& Folder;
+  std::mutex Adding; ///< to the folder
   std::size_t Phases;
   std::size_t Digits;
 };
 
-/// Phases come in their order: all are named, then those are written that are written here.
+/// Phases are named in their order; then those that are written here are written, some beside each other.
 class Format
 {
 public:
