@@ -51,7 +51,7 @@ run("configuring the consumer" "${CMAKE_COMMAND}" -S "${SOURCE_DIR}" -B "${WORK_
   "-DRUN=${WORK_DIR}/patient")
 # A patient's result: coarse images of the phantom at one phase, moved as a population's hearts are.
 run("the installed coronary-pipeline phantom" "${prefix}/bin/coronary-pipeline" phantom --seed 2 --fractions 0.75
-  --spacing 0.8 --no-truth --quiet --output "${WORK_DIR}/images")
+  --spacing 1.2 --no-truth --quiet --output "${WORK_DIR}/images")
 run("the installed coronary-pipeline run" "${prefix}/bin/coronary-pipeline" run "${WORK_DIR}/images/series.json" --quiet
   --edges 0.5 1.5 --output "${WORK_DIR}/patient")
 run("building the consumer" "${CMAKE_COMMAND}" --build "${WORK_DIR}/consumer")

@@ -33,6 +33,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <vector>
 
 using coronary::ImageGrid;
@@ -552,15 +553,20 @@ TEST(CenterlineTracker, RefusesSeriesThatAreNone)
   const coronary::CoronaryPhantom phantom{ coronary::PhantomSettings() };
   const ImageGrid grid = phantom.DefaultGrid(1.5, 6.0);
   images->Whole = grid.extent;
+  std::map<double, vtkSmartPointer<vtkImageData>> masks;
+  for (const double time : { 0.35, 0.75 })
+  {
+    masks[time] = MaskAt(phantom, grid, time);
+  }
   const auto atHalf = [&](const std::function<vtkSmartPointer<vtkDataObject>()>& other)
   {
-    images->Give = [&phantom, grid, other](double time) -> vtkSmartPointer<vtkDataObject>
+    images->Give = [&masks, other](double time) -> vtkSmartPointer<vtkDataObject>
     {
       if (time == 0.5)
       {
         return other();
       }
-      return MaskAt(phantom, grid, time);
+      return masks.at(time);
     };
     images->Modified();
   };
@@ -591,7 +597,8 @@ TEST(CenterlineTracker, RefusesSeriesThatAreNone)
   atHalf(
     [&]
     {
-      auto image = MaskAt(phantom, grid, 0.5);
+      auto image = vtkSmartPointer<vtkImageData>::New();
+      image->DeepCopy(masks.at(0.35));
       image->GetPointData()->GetScalars()->Fill(0.0);
       return image;
     });

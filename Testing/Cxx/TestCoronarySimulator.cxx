@@ -400,7 +400,7 @@ TEST_F(TestCoronarySimulator, APatientsImagesBecomeVesselsAndBackground)
       arguments + " --quiet >stdout 2>stderr")
                          .c_str());
   };
-  ASSERT_EQ(pipeline("phantom --no-truth --fractions 0.75 --seed 1 --spacing 0.8 --output anna"), 0)
+  ASSERT_EQ(pipeline("phantom --no-truth --fractions 0.75 --seed 1 --spacing 1.2 --output anna"), 0)
     << this->Said();
   ASSERT_EQ(
     pipeline("run anna/series.json --motion none --until surface --output anna-coronary"), 0)
