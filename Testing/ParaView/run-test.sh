@@ -24,6 +24,8 @@ export PYTHONDONTWRITEBYTECODE=1
 # memory of its neighbour.
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 export OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_btl_vader_single_copy_mechanism=none
+# Its daemon asks every X server of the machine for graphics cards, and dies with one that is just going: another test's.
+export HWLOC_COMPONENTS=-gl
 
 cd "$work"
 
