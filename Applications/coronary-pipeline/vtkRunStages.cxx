@@ -64,6 +64,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <stdexcept>
 
 namespace coronary
@@ -795,8 +796,12 @@ Json MakeWeights(RunStep& step)
   weights->SetLeaveOutside(settings.leaveBonesOutside);
   Update(weights, step);
   vtkUnstructuredGrid* bound = weights->GetOutput();
-  WriteUnstructuredGrid(step.Add("weights.vtu"), bound, step.input.Messages);
-  WriteMatrixFile(step.Add("weights.dmat"), WeightMatrix(bound, bones->GetNumberOfLines()));
+  const std::string mesh = step.Add("weights.vtu");
+  std::future<void> matrix = std::async(std::launch::async,
+    [bound, path = step.Add("weights.dmat"), count = bones->GetNumberOfLines()]
+    { WriteMatrixFile(path, WeightMatrix(bound, count)); });
+  WriteUnstructuredGrid(mesh, bound, step.input.Messages);
+  matrix.get();
   Json numbers = { { "file", "weights.vtu" }, { "matrix_file", "weights.dmat" },
     { "skeleton_file", "skeleton.vtp" }, { "skeleton_graph_file", "skeleton.tgf" },
     { "bones", bones->GetNumberOfLines() }, { "joints", bones->GetNumberOfPoints() },
