@@ -110,7 +110,8 @@ std::string Numbers(const Json& session)
     { "wire moved, mm", "wire_travel_mm" },
     { "of it in the vessel without X-ray, mm", "wire_travel_without_xray_mm" },
     { "wire beyond the catheter at most, mm", "deepest_mm" },
-    { "vessel closed by a balloon, s", "occluded_s" } };
+    { "vessel closed by a balloon, s", "occluded_s" },
+    { "ST segment up by 0.1 mV, s", "st_elevated_s" } };
   const Json& metrics = session.at("metrics");
   std::string page = "<h2>Numbers</h2>\n<table>\n";
   for (const auto& [name, member] : rows)

@@ -86,7 +86,8 @@ Json MetricsToJson(const SessionMetrics& metrics, const WallTopology& topology)
     { "wire_turning_rad", metrics.wireTurning }, { "deepest_mm", metrics.deepest },
     { "wire_travel_without_xray_mm", metrics.blindTravel },
     { "idle_xray_s", metrics.idleBeamSeconds }, { "occluded_s", metrics.occludedSeconds },
-    { "path", branches }, { "events", events } };
+    { "greatest_st_shift_mV", metrics.greatestStShift },
+    { "st_elevated_s", metrics.elevatedSeconds }, { "path", branches }, { "events", events } };
 }
 
 Json LesionsToJson(const std::vector<LesionResult>& lesions)

@@ -18,7 +18,6 @@ namespace
 constexpr double PascalPerMmHg = 133.322387415;
 constexpr double ReferenceLength = 100.0; // mm
 constexpr double OutletLength = 10.0;     // mm before a tip whose mean radius is the outlet's
-constexpr double FlowReserve = 4.0;       // Gould, Lipscomb, Hamilton, Am J Cardiol 1974;33:87
 constexpr double ExpansionLoss = 1.52;    // K_t of Seeley and Young
 constexpr int StepsOfCycle = 160;
 constexpr double ClosedRadius = 0.02; // mm of what an instrument leaves, at least
@@ -171,6 +170,7 @@ CoronaryFlow::CoronaryFlow(const WallTopology& topology, const CoronaryFlowSetti
     this->CalibrateRatio(
       static_cast<int>(t), right ? settings.rightDiastolicRatio : settings.leftDiastolicRatio);
   }
+  this->HealthyFlow = this->TipFlows();
   for (std::size_t s = 0; s < segments; ++s)
   {
     const FlowSegment& segment = this->Network_.Segments()[s];
@@ -362,30 +362,59 @@ double CoronaryFlow::MeanAorticPressure() const
   return mean;
 }
 
-std::vector<double> CoronaryFlow::FlowReserves(const std::vector<CatheterTip>& places) const
+/// All outlets' resistances times a factor, until nothing moves any more.
+CoronaryFlow CoronaryFlow::InSteadyFlow(double outletFactor) const
 {
   constexpr int MostSteps = 200;
   CoronaryFlow steady = *this;
   steady.SetInjector(0.0, {});
   for (double& resistance : steady.OutletResistance_)
   {
-    resistance /= FlowReserve;
+    resistance *= outletFactor;
   }
   const double aortic = this->MeanAorticPressure();
-  std::vector<double> reserves(places.size(), 0.0);
-  bool moved = !places.empty();
+  bool moved = true;
   for (int k = 0; k < MostSteps && moved; ++k)
   {
+    const std::vector<double> before = steady.Pressure_;
     steady.SolveSteady(aortic);
-    moved = false;
-    for (std::size_t n = 0; n < places.size(); ++n)
+    moved = !std::equal(before.begin(), before.end(), steady.Pressure_.begin(),
+      [aortic](double a, double b) { return std::abs(a - b) < 1e-12 * aortic; });
+  }
+  return steady;
+}
+
+std::vector<double> CoronaryFlow::FlowReserves(const std::vector<CatheterTip>& places) const
+{
+  std::vector<double> reserves;
+  if (!places.empty())
+  {
+    const CoronaryFlow steady = this->InSteadyFlow(1.0 / HyperaemicFlow);
+    const double aortic = this->MeanAorticPressure();
+    for (const CatheterTip& place : places)
     {
-      const double reserve = steady.PressureAt(places[n]) / aortic;
-      moved = moved || std::abs(reserve - reserves[n]) >= 1e-12;
-      reserves[n] = reserve;
+      reserves.push_back(steady.PressureAt(place) / aortic);
     }
   }
   return reserves;
+}
+
+std::vector<double> CoronaryFlow::TipFlows() const
+{
+  return this->InSteadyFlow(1.0).FlowOfTips();
+}
+
+std::vector<double> CoronaryFlow::FlowOfTips() const
+{
+  std::vector<double> flows(this->Pressure_.size(), 0.0);
+  for (std::size_t n = 0; n < flows.size(); ++n)
+  {
+    if (this->Network_.IsTip(static_cast<int>(n)))
+    {
+      flows[n] = this->Flow_[this->Network_.Nodes()[n].above];
+    }
+  }
+  return flows;
 }
 
 double CoronaryFlow::ResistanceTo(int branch, double abscissa) const
@@ -539,7 +568,7 @@ void CoronaryFlow::CalibrateMean(int tree, double target)
     };
     this->Losses[s].linear = healthyTo(segments[s].to) - healthyTo(segments[s].from);
   }
-  speed(bisect(ideal / FlowReserve, ideal));
+  speed(bisect(ideal / HyperaemicFlow, ideal));
   for (std::size_t n = 0; n < nodes; ++n)
   {
     const double before = this->Settings_.arterialShare;

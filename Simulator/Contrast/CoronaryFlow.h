@@ -149,7 +149,18 @@ public:
   /// Fractional flow reserves: mean pressure at places over the aortic one in steady flow, with the outlets' resistance a
   /// quarter of what it is at rest (hyperaemia). The lumen alone decides. It takes some milliseconds.
   std::vector<double> FlowReserves(const std::vector<CatheterTip>& places) const;
+  /// mL/s that tips take in steady flow at rest, per node (others: 0): with the lumen as it is, which takes some milliseconds...
+  std::vector<double> TipFlows() const;
+  /// ... and without lesions.
+  const std::vector<double>& HealthyTipFlows() const { return this->HealthyFlow; }
   ///@}
+
+  /// The microcirculation takes 1 / HyperaemicFlow of its resistance at rest at least (Gould, Lipscomb, Hamilton, Am J Cardiol
+  /// 1974;33:87).
+  static constexpr double HyperaemicFlow = 4.0;
+  /// Where less than this of a tip's flow passes a lesion, even that does not bring it what it takes at rest: with a resistance
+  /// R of the tip, a lesion of (1 - 1 / HyperaemicFlow) R.
+  static constexpr double LeastSupply = 1.0 / (2.0 - 1.0 / HyperaemicFlow);
 
   /// Over the bits of all that the next step depends on. @param before  the digest to go on from
   std::uint64_t StateHash(std::uint64_t before) const;
@@ -200,6 +211,8 @@ private:
   int CyclesToSettle() const;
   void Settle(double phase);
   void SolveSteady(double aortic);
+  CoronaryFlow InSteadyFlow(double outletFactor) const;
+  std::vector<double> FlowOfTips() const;
   void Advance(double dt, double aortic, double ventricular);
   void SolveTrees(double aortic);
   void SetInjector(double injection, const CatheterTip& tip);
@@ -214,6 +227,7 @@ private:
   // Per node; of tips.
   std::vector<double> Weight;
   std::vector<double> OutletResistance_; ///< R1 + R2
+  std::vector<double> HealthyFlow;
   std::vector<double> Compliance;
   std::vector<double> Compartment; ///< pressure at the compliance
   std::vector<Demand> Demands;     ///< of the node and all beyond it

@@ -13,10 +13,11 @@ namespace coronary
 /**
  * Waves P, Q, R, S, T as bells about their places in the cycle, with the parameters of McSharry et al. 2003 (IEEE
  * Trans Biomed Eng 50:289, table I), the bells summed directly instead of by their differential equation. For the eye.
- * @param phase  fraction of the R-R interval, the R wave at 0; any real number
- * @return mV, about -0.2 to 1.1
+ * @param phase    fraction of the R-R interval, the R wave at 0; any real number
+ * @param stShift  mV that the trace is lifted by between the S wave and the end of the T wave
+ * @return mV, about -0.2 to 1.1 without shift
  */
-inline double ElectrocardiogramAt(double phase)
+inline double ElectrocardiogramAt(double phase, double stShift = 0.0)
 {
   struct Wave
   {
@@ -27,7 +28,10 @@ inline double ElectrocardiogramAt(double phase)
   constexpr std::array<Wave, 5> waves{ Wave{ -M_PI / 3.0, 0.12, 0.25 },
     Wave{ -M_PI / 12.0, -0.13, 0.1 }, Wave{ 0.0, 1.1, 0.1 }, Wave{ M_PI / 12.0, -0.22, 0.1 },
     Wave{ M_PI / 2.0, 0.28, 0.4 } };
-  double sum = 0.0;
+  // Two logistic steps, at the end of the S wave and in the falling part of the T wave.
+  const double angle = 2.0 * M_PI * (phase - std::floor(phase));
+  double sum =
+    stShift / (1.0 + std::exp((0.45 - angle) / 0.04)) / (1.0 + std::exp((angle - 2.0) / 0.12));
   for (const Wave& wave : waves)
   {
     const double turn = phase - wave.angle / (2.0 * M_PI);

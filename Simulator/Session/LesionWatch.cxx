@@ -13,6 +13,7 @@ constexpr double PressureTime = 2.0;    // s of the running means
 constexpr double ThinnestGraded = 0.75; // mm, radius without the lesion, as in docs/lesions.md
 constexpr double Relaxed = 0.5;         // atm: what is below is another inflation
 constexpr double SpringBack = 0.1;      // s after which a stent is judged
+constexpr double LongestChange = 0.5;   // s without another look at the flow
 
 std::string Format(const char* text, ...)
 {
@@ -36,7 +37,8 @@ const char* NameOf(ProcedureEvent::Kind kind, const char*& quantity)
   static const char* const names[][2] = { { "over_expansion", "diameter_over_reference" },
     { "over_rated_pressure", "atm" }, { "stent_over_expansion", "diameter_over_greatest" },
     { "under_expansion", "area_over_reference" }, { "malapposition", "gap_mm" },
-    { "geographic_miss", "disease_mm" }, { "beyond_vessel", "stent_mm" } };
+    { "geographic_miss", "disease_mm" }, { "beyond_vessel", "stent_mm" },
+    { "ischaemia", "share_without_blood" } };
   const auto& [name, value] = names[static_cast<int>(kind)];
   quantity = value;
   return name;
@@ -93,6 +95,7 @@ int LesionWatch::BranchOf(std::int64_t point) const
 
 void LesionWatch::StepFlow(double seconds, const Intervention& instruments, ContrastModel& medium)
 {
+  this->FlowIsNew_ = false;
   if (const DilatableWall* wall = instruments.Dilated())
   {
     std::vector<double> filled(wall->Radii().size(), 0.0);
@@ -106,13 +109,17 @@ void LesionWatch::StepFlow(double seconds, const Intervention& instruments, Cont
       this->Lumen_ = wall->Radii();
       medium.SetLumen(this->Lumen_, this->Filled_);
       this->ReserveIsOld = true;
+      this->ChangesFor += seconds;
+      this->FlowIsNew_ = this->ChangesFor >= LongestChange;
     }
     else if (this->ReserveIsOld)
     {
       // A network to be solved until it rests: not while a balloon moves or fills.
       this->Reserve = medium.FlowModel().FlowReserves(this->Distal);
       this->ReserveIsOld = false;
+      this->FlowIsNew_ = true;
     }
+    this->ChangesFor = this->FlowIsNew_ ? 0.0 : this->ChangesFor;
   }
   const double share = -std::expm1(-seconds / PressureTime);
   for (std::size_t n = 0; n < this->Lesions.size(); ++n)
@@ -126,11 +133,35 @@ void LesionWatch::StepFlow(double seconds, const Intervention& instruments, Cont
   }
 }
 
+std::string LesionWatch::NameOfBranch(int branch) const
+{
+  const auto n = static_cast<std::size_t>(branch);
+  const bool named = n < this->Names.size() && !this->Names[n].empty();
+  return named ? this->Names[n] : "a vessel without a name";
+}
+
 std::string LesionWatch::NameAt(std::int64_t point) const
 {
-  const auto branch = static_cast<std::size_t>(this->BranchOf(point));
-  const bool named = branch < this->Names.size() && !this->Names[branch].empty();
-  return named ? this->Names[branch] : "a vessel without a name";
+  return this->NameOfBranch(this->BranchOf(point));
+}
+
+void LesionWatch::TellIschaemia(
+  const Ischaemia& heart, double seconds, double place, std::vector<std::string>& said)
+{
+  const std::vector<int> branches = heart.BranchesWithout();
+  std::string names;
+  for (const int branch : branches)
+  {
+    names += (names.empty() ? " (" : ", ") + this->NameOfBranch(branch);
+  }
+  const double share = heart.ShareWithout();
+  said.push_back(
+    Format(
+      "The ST segment is up by %.1f mV: %.0f %% of the heart that these arteries supply lack blood",
+      Ischaemia::Elevated, 100.0 * share) +
+    names + (names.empty() ? "." : ")."));
+  this->Events_.push_back({ ProcedureEvent::Kind::Ischaemia, seconds,
+    branches.empty() ? -1 : branches.front(), share, place });
 }
 
 /// @param point  of the axes where it is; -1: in the guide

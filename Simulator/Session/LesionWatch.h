@@ -8,6 +8,7 @@
 
 #include "ContrastModel.h"
 #include "Intervention.h"
+#include "Ischaemia.h"
 #include "StentResult.h"
 #include "VesselLesions.h"
 
@@ -44,7 +45,8 @@ struct ProcedureEvent
     UnderExpansion,     ///< value: least area over the reference's
     Malapposition,      ///< value: mm from stent to wall
     GeographicMiss,     ///< value: mm of the disease that are beside the stent
-    BeyondVessel        ///< value: mm of the stent without a vessel around
+    BeyondVessel,       ///< value: mm of the stent without a vessel around
+    Ischaemia           ///< the ST segment is up; value: share of the heart without blood
   };
   Kind kind = Kind::OverExpansion;
   double seconds = 0.0;
@@ -63,6 +65,11 @@ public:
 
   /// A step of the flow: the lumen as it is now, and what lies in it, goes into the network.
   void StepFlow(double seconds, const Intervention& instruments, ContrastModel& medium);
+  /// Whether it is another flow since this was true before: the lumen has come to rest, or has changed for half a second.
+  bool FlowIsNew() const { return this->FlowIsNew_; }
+  /// @param place  mm from the ostium
+  void TellIschaemia(
+    const Ischaemia& heart, double seconds, double place, std::vector<std::string>& said);
   /// @param said  gets a sentence of each new event
   void StepTick(double seconds, const Intervention& instruments, const BalloonCatheter& balloon,
     std::vector<std::string>& said);
@@ -102,6 +109,7 @@ private:
     bool beyond = false;
   };
   int BranchOf(std::int64_t point) const;
+  std::string NameOfBranch(int branch) const;
   std::string NameAt(std::int64_t point) const;
   void Tell(ProcedureEvent event, std::int64_t point, const std::string& text,
     std::vector<std::string>& said);
@@ -111,8 +119,10 @@ private:
   std::vector<Watched> Lesions;
   std::vector<CatheterTip> Distal; ///< place behind each lesion
   std::vector<double> ReserveBefore;
-  std::vector<double> Reserve;                ///< of the lumen when it last stayed for a step
-  bool ReserveIsOld = false;                  ///< the lumen has changed since
+  std::vector<double> Reserve; ///< of the lumen when it last stayed for a step
+  bool ReserveIsOld = false;   ///< the lumen has changed since
+  double ChangesFor = 0.0;     ///< s
+  bool FlowIsNew_ = false;
   std::vector<std::int64_t> First;            ///< point of each branch
   std::vector<std::vector<double>> Reference; ///< mm, radii
   std::vector<std::string> Names;             ///< of branches

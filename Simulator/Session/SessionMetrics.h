@@ -28,6 +28,9 @@ struct SessionMetrics
   double blindTravel = 0.0;      ///< mm of it with the tip beyond the catheter and no X-ray
   double idleBeamSeconds = 0.0;  ///< X-ray while nothing has moved for longer than LongestLook
   double occludedSeconds = 0.0;  ///< a balloon closed the vessel
+  double stShift = 0.0;          ///< mV, now
+  double greatestStShift = 0.0;  ///< mV
+  double elevatedSeconds = 0.0;  ///< ST segment up by Ischaemia::Elevated or more
   double wireTurning = 0.0;      ///< radians, left and right together
   double deepest = 0.0;          ///< mm of wire beyond the catheter's tip
   std::vector<int> branches; ///< in which the tip has been, in the order in which they were reached

@@ -57,6 +57,7 @@ struct TrainingSession::Internals
     , Physics(this->Wall, scenario.wire, scenario.catheter, this->Settings, scenario.balloon)
     , Medium(this->Wall->Topology(), scenario.contrast, scenario.seed)
     , Watch(this->Wall->Topology(), this->Medium)
+    , Heart(this->Medium.FlowModel())
     , Clock(AcquisitionOf(scenario))
     , HeartRate(this->Settings.heartRate)
     , TicksOfContrast(std::max<std::uint64_t>(
@@ -80,6 +81,7 @@ struct TrainingSession::Internals
   void SetView(const SessionInput& input);
   void SetField();
   void StepContrast(const SessionInput& input);
+  void StepIschaemia(double seconds);
   void Measure(const SessionInput& input);
   void MeasureHands(const SessionInput& input);
   void StepProcedure();
@@ -91,6 +93,7 @@ struct TrainingSession::Internals
   Intervention Physics;
   ContrastModel Medium;
   LesionWatch Watch;
+  Ischaemia Heart;
   std::vector<ProcedureStep> Steps;
   std::optional<ProcedureWatch> Procedure;
   double LastMoved = 0.0; // s
@@ -161,8 +164,33 @@ void TrainingSession::Internals::StepContrast(const SessionInput& input)
   this->Report.injection = pushed / seconds;
   const double place = this->Report.tick.catheterTip;
   this->Watch.StepFlow(seconds, this->Physics, this->Medium);
+  this->StepIschaemia(seconds);
   this->Medium.Step(seconds, this->Report.tick.phase, this->HeartRate, this->Report.injection,
     { place >= 0.0 ? this->Settings.rootBranch : -1, std::max(0.0, place) });
+}
+
+void TrainingSession::Internals::StepIschaemia(double seconds)
+{
+  if (this->Watch.FlowIsNew())
+  {
+    this->Heart.SetFlow(this->Medium.FlowModel());
+  }
+  this->Heart.Step(seconds);
+  SessionMetrics& metrics = this->Metrics;
+  const bool before = metrics.stShift >= Ischaemia::Elevated;
+  metrics.stShift = this->Heart.StShift();
+  metrics.greatestStShift = std::max(metrics.greatestStShift, metrics.stShift);
+  const bool now = metrics.stShift >= Ischaemia::Elevated;
+  metrics.elevatedSeconds += now ? seconds : 0.0;
+  if (now && !before)
+  {
+    this->Watch.TellIschaemia(
+      this->Heart, metrics.procedureSeconds, this->Report.tick.balloon.middle, this->Messages);
+  }
+  else if (before && !now)
+  {
+    this->Messages.emplace_back("The ST segment is back.");
+  }
 }
 
 void TrainingSession::Internals::Measure(const SessionInput& input)

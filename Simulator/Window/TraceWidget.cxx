@@ -37,12 +37,13 @@ void TraceWidget::Clear()
 void TraceWidget::Add(const SessionSnapshot& snapshot)
 {
   const double phase = snapshot.report.phase;
+  const double shift = snapshot.metrics.stShift;
   this->HeartRate = snapshot.heartRate;
   if (this->Empty || this->Samples.empty() || snapshot.seconds < this->Samples.back().seconds)
   {
     this->Samples.clear();
     this->Samples.push_back(
-      { snapshot.seconds, ElectrocardiogramAt(phase), snapshot.aorticPressure });
+      { snapshot.seconds, ElectrocardiogramAt(phase, shift), snapshot.aorticPressure });
   }
   else
   {
@@ -56,11 +57,12 @@ void TraceWidget::Add(const SessionSnapshot& snapshot)
     {
       const double share = static_cast<double>(n) / steps;
       this->Samples.push_back({ from + share * (snapshot.seconds - from),
-        ElectrocardiogramAt(this->LastPhase + share * turned),
+        ElectrocardiogramAt(this->LastPhase + share * turned, shift),
         this->LastPressure + share * (snapshot.aorticPressure - this->LastPressure) });
     }
   }
   this->Empty = false;
+  this->StShift = shift;
   this->LastPhase = phase;
   this->LastPressure = snapshot.aorticPressure;
   while (this->Samples.front().seconds < snapshot.seconds - Shown)
@@ -98,6 +100,13 @@ void TraceWidget::paintEvent(QPaintEvent*)
   painter.setPen(QColor(150, 160, 165));
   const QRect writing = this->rect().adjusted(8, 4, -8, -4);
   painter.drawText(writing, Qt::AlignLeft | Qt::AlignTop, "ECG");
+  if (this->StShift >= Ischaemia::Elevated)
+  {
+    painter.setPen(QColor(255, 200, 60));
+    painter.drawText(writing.adjusted(0, 18, 0, 0), Qt::AlignLeft | Qt::AlignTop,
+      QString("ST +%1").arg(this->StShift, 0, 'f', 1));
+    painter.setPen(QColor(150, 160, 165));
+  }
   painter.drawText(writing, Qt::AlignLeft | Qt::AlignBottom, "Ao");
   painter.setPen(QColor(90, 230, 120));
   QFont font = painter.font();

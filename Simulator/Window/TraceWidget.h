@@ -40,6 +40,7 @@ private:
   double LastPhase = 0.0;
   double LastPressure = 0.0;
   double HeartRate = 0.0;
+  double StShift = 0.0; // mV
   bool Empty = true;
 };
 }
