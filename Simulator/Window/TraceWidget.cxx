@@ -100,13 +100,6 @@ void TraceWidget::paintEvent(QPaintEvent*)
   painter.setPen(QColor(150, 160, 165));
   const QRect writing = this->rect().adjusted(8, 4, -8, -4);
   painter.drawText(writing, Qt::AlignLeft | Qt::AlignTop, "ECG");
-  if (this->StShift >= Ischaemia::Elevated)
-  {
-    painter.setPen(QColor(255, 200, 60));
-    painter.drawText(writing.adjusted(0, 18, 0, 0), Qt::AlignLeft | Qt::AlignTop,
-      QString("ST +%1").arg(this->StShift, 0, 'f', 1));
-    painter.setPen(QColor(150, 160, 165));
-  }
   painter.drawText(writing, Qt::AlignLeft | Qt::AlignBottom, "Ao");
   painter.setPen(QColor(90, 230, 120));
   QFont font = painter.font();
@@ -115,6 +108,12 @@ void TraceWidget::paintEvent(QPaintEvent*)
   painter.setFont(font);
   painter.drawText(writing, Qt::AlignRight | Qt::AlignTop,
     this->HeartRate > 0.0 ? QString("%1 /min").arg(this->HeartRate, 0, 'f', 0) : QString("pause"));
+  if (this->StShift >= Ischaemia::Elevated)
+  {
+    painter.setPen(QColor(255, 200, 60));
+    painter.drawText(writing, Qt::AlignRight | Qt::AlignVCenter,
+      QString("ST +%1 mV").arg(this->StShift, 0, 'f', 1));
+  }
   painter.setPen(QColor(240, 90, 80));
   if (!this->Samples.empty())
   {
