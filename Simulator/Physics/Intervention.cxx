@@ -34,8 +34,8 @@ constexpr double BalloonParked = 5.0;  // mm behind the simulated wire's end, at
 constexpr double ParkedWithin = 1.0;   // mm from there: it can be exchanged
 constexpr double Emptied = 0.5;        // atm, likewise
 
-/// How much harder a vessel is than its stiffness against the bare wire: what begins a tick deep inside the wall, as a tip that a hand jams into the end
-/// of a thin vessel, must not come through with its middle. Usual contacts are a tenth as deep.
+/// How much harder a vessel is than its stiffness against the bare wire: what begins a tick deep inside the wall, as a tip that
+/// a hand jams into the end of a thin vessel, must not come through with its middle. Usual contacts are a tenth as deep.
 double Hardening(double gap)
 {
   constexpr double deepInside = 0.05;   // mm
