@@ -708,26 +708,22 @@ protected:
     const Image& image = this->Slices[static_cast<std::size_t>(k)][static_cast<std::size_t>(phase)];
     plane.slope = image.frame->slope;
     plane.intercept = image.frame->intercept;
-    if (image.file->frames.size() == 1)
-    {
-      plane.type = DicomPixelReader().Read(*image.file, image.frameIndex, plane.bytes);
-    }
-    else
-    {
-      plane.type = this->Pixels.Read(*image.file, image.frameIndex, plane.bytes);
-    }
+    DicomPixelReader own; // from any thread
+    DicomPixelReader& pixels = HasFileOfItsOwn(image) ? own : this->Pixels;
+    plane.type = pixels.Read(*image.file, image.frameIndex, plane.bytes);
   }
 
   bool HasSeparatePlanes(int phase) const override
   {
     return std::all_of(this->Slices.begin(), this->Slices.end(),
       [phase](const auto& slice)
-      { return slice[static_cast<std::size_t>(phase)].file->frames.size() == 1; });
+      { return HasFileOfItsOwn(slice[static_cast<std::size_t>(phase)]); });
   }
 
   void EndOfVolume() override { this->Pixels.Close(); }
 
 private:
+  static bool HasFileOfItsOwn(const Image& image) { return image.file->frames.size() == 1; }
   Files Select(const std::string& folder, const std::string& seriesUid);
   void SetGrid(double sliceSpacing);
   void SetNotes(const std::map<std::string, Files>& series, TimeSource source);

@@ -1,8 +1,6 @@
 #include "TetrahedralBoundary.h"
 
 #include <algorithm>
-#include <array>
-#include <numeric>
 #include <tuple>
 
 namespace coronary
@@ -70,62 +68,37 @@ std::vector<Face> AlongNeighbours(const std::vector<Face>& faces)
 std::vector<std::pair<Triangle, std::int64_t>> BoundaryFaces(
   const std::vector<Tetrahedron>& tetrahedra)
 {
-  // Sides by their smallest corner, which few share: to sort all of them takes five times as long.
   struct Side
   {
-    std::int64_t middle;
-    std::int64_t largest;
-    std::int64_t cell;
+    Triangle sorted;
     Triangle face;
+    std::int64_t cell;
   };
-  const auto sidesOf = [](const Tetrahedron& t)
-  {
-    return std::array<Triangle, 4>{ Triangle{ t[1], t[2], t[3] }, Triangle{ t[0], t[3], t[2] },
-      Triangle{ t[0], t[1], t[3] }, Triangle{ t[0], t[2], t[1] } };
-  };
-  std::vector<std::size_t> ends; // of the sides of each smallest corner
-  for (const Tetrahedron& t : tetrahedra)
-  {
-    for (const Triangle& face : sidesOf(t))
-    {
-      const auto smallest = static_cast<std::size_t>(*std::min_element(face.begin(), face.end()));
-      if (smallest >= ends.size())
-      {
-        ends.resize(smallest + 1);
-      }
-      ++ends[smallest];
-    }
-  }
-  std::partial_sum(ends.begin(), ends.end(), ends.begin());
-  std::vector<Side> sides(4 * tetrahedra.size());
-  std::vector<std::size_t> next{ 0 };
-  next.insert(next.end(), ends.begin(), ends.end());
+  std::vector<Side> faces;
+  faces.reserve(4 * tetrahedra.size());
   for (std::size_t i = 0; i < tetrahedra.size(); ++i)
   {
-    for (const Triangle& face : sidesOf(tetrahedra[i]))
+    const Tetrahedron& t = tetrahedra[i];
+    for (const Triangle& face : { Triangle{ t[1], t[2], t[3] }, Triangle{ t[0], t[3], t[2] },
+           Triangle{ t[0], t[1], t[3] }, Triangle{ t[0], t[2], t[1] } })
     {
       Triangle sorted = face;
       std::sort(sorted.begin(), sorted.end());
-      sides[next[sorted[0]]++] = { sorted[1], sorted[2], static_cast<std::int64_t>(i), face };
+      faces.push_back({ sorted, face, static_cast<std::int64_t>(i) });
     }
   }
+  std::sort(faces.begin(), faces.end(),
+    [](const Side& a, const Side& b)
+    { return std::tie(a.sorted, a.cell) < std::tie(b.sorted, b.cell); });
   std::vector<std::pair<Triangle, std::int64_t>> boundary;
-  std::size_t first = 0;
-  for (const std::size_t end : ends)
+  for (std::size_t i = 0; i < faces.size(); ++i)
   {
-    std::sort(sides.begin() + first, sides.begin() + end,
-      [](const Side& a, const Side& b)
-      { return std::tie(a.middle, a.largest) < std::tie(b.middle, b.largest); });
-    const auto same = [&sides](std::size_t a, std::size_t b)
-    { return sides[a].middle == sides[b].middle && sides[a].largest == sides[b].largest; };
-    for (std::size_t n = first; n < end; ++n)
+    const bool before = i > 0 && faces[i - 1].sorted == faces[i].sorted;
+    const bool after = i + 1 < faces.size() && faces[i + 1].sorted == faces[i].sorted;
+    if (!before && !after)
     {
-      if (!(n > first && same(n, n - 1)) && !(n + 1 < end && same(n, n + 1)))
-      {
-        boundary.emplace_back(sides[n].face, sides[n].cell);
-      }
+      boundary.emplace_back(faces[i].face, faces[i].cell);
     }
-    first = end;
   }
   std::sort(boundary.begin(), boundary.end(),
     [](const auto& a, const auto& b)

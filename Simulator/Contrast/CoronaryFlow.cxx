@@ -401,17 +401,14 @@ std::vector<double> CoronaryFlow::FlowReserves(const std::vector<CatheterTip>& p
 
 std::vector<double> CoronaryFlow::TipFlows() const
 {
-  return this->InSteadyFlow(1.0).FlowOfTips();
-}
-
-std::vector<double> CoronaryFlow::FlowOfTips() const
-{
-  std::vector<double> flows(this->Pressure_.size(), 0.0);
-  for (std::size_t n = 0; n < flows.size(); ++n)
+  const CoronaryFlow steady = this->InSteadyFlow(1.0);
+  const std::vector<FlowNode>& nodes = this->Network_.Nodes();
+  std::vector<double> flows(nodes.size(), 0.0);
+  for (std::size_t n = 0; n < nodes.size(); ++n)
   {
     if (this->Network_.IsTip(static_cast<int>(n)))
     {
-      flows[n] = this->Flow_[this->Network_.Nodes()[n].above];
+      flows[n] = steady.Flow_[nodes[n].above];
     }
   }
   return flows;

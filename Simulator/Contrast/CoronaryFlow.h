@@ -212,7 +212,6 @@ private:
   void Settle(double phase);
   void SolveSteady(double aortic);
   CoronaryFlow InSteadyFlow(double outletFactor) const;
-  std::vector<double> FlowOfTips() const;
   void Advance(double dt, double aortic, double ventricular);
   void SolveTrees(double aortic);
   void SetInjector(double injection, const CatheterTip& tip);

@@ -32,7 +32,7 @@ struct InterventionSettings
   int rootBranch = -1;          ///< branch whose ostium is engaged; -1: as the artery says
   double engagement = 3.0;      ///< mm from the ostium to the catheter's tip along the vessel
   double wallFriction = 1.0;    ///< factor on the wire's friction against the wall, 0 to 10
-  double wallStiffness = 60.0;  ///< N/mm of a sample's contact
+  double wallStiffness = 60.0;  ///< N/mm of a sample's contact; harder where the bare wire is deep
   /// Pa s: per length, across and along the wire, against blood that moves with the walls. Blood's own is about
   /// 0.025; a hundred times that calms the jumps of the light tip, and is still nothing against friction.
   double drag = 2.5;

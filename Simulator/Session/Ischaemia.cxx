@@ -15,10 +15,9 @@ constexpr double Shortage = 0.02;   // of what a tip needs: less is none
 }
 
 Ischaemia::Ischaemia(const CoronaryFlow& flow)
-  : Names(flow.Network().Topology().groupName)
 {
   const FlowNetwork& network = flow.Network();
-  const std::vector<double> healthy = flow.HealthyTipFlows();
+  const std::vector<double>& healthy = flow.HealthyTipFlows();
   const std::vector<double> now = flow.TipFlows();
   double all = 0.0;
   for (std::size_t n = 0; n < healthy.size(); ++n)
@@ -87,20 +86,9 @@ std::vector<int> Ischaemia::BranchesWithout() const
     [](const Tip& tip) { return tip.lacks > 0.0; });
   std::stable_sort(
     without.begin(), without.end(), [](const Tip& a, const Tip& b) { return a.share > b.share; });
-  const auto same = [this](int a, int b)
-  {
-    const auto named = [this](int n) { return static_cast<std::size_t>(n) < this->Names.size(); };
-    return a == b || (named(a) && named(b) && this->Names[a] == this->Names[b]);
-  };
   std::vector<int> branches;
-  for (const Tip& tip : without)
-  {
-    if (std::none_of(
-          branches.begin(), branches.end(), [&](int other) { return same(tip.branch, other); }))
-    {
-      branches.push_back(tip.branch);
-    }
-  }
+  std::transform(without.begin(), without.end(), std::back_inserter(branches),
+    [](const Tip& tip) { return tip.branch; });
   return branches;
 }
 }

@@ -7,7 +7,6 @@
 
 #include "CoronaryFlow.h"
 
-#include <string>
 #include <vector>
 
 namespace coronary
@@ -37,7 +36,7 @@ public:
   double StShift() const; ///< mV, at least 0
   /// Of the heart that the arteries here supply: how much lacks blood now, 0 to 1.
   double ShareWithout() const;
-  /// Branches whose tips lack blood, those with most heart first; parts of one vessel are one.
+  /// Branches whose tips lack blood, those with most heart first.
   std::vector<int> BranchesWithout() const;
 
 private:
@@ -51,7 +50,6 @@ private:
     double injury = 0.0; ///< 0 to 1
   };
   std::vector<Tip> Tips;
-  std::vector<std::string> Names; ///< of branches
 };
 }
 

@@ -149,17 +149,24 @@ void LesionWatch::TellIschaemia(
   const Ischaemia& heart, double seconds, double place, std::vector<std::string>& said)
 {
   const std::vector<int> branches = heart.BranchesWithout();
-  std::string names;
+  // Parts of one vessel are one.
+  std::vector<std::string> names;
+  std::string list;
   for (const int branch : branches)
   {
-    names += (names.empty() ? " (" : ", ") + this->NameOfBranch(branch);
+    const std::string name = this->NameOfBranch(branch);
+    if (std::find(names.begin(), names.end(), name) == names.end())
+    {
+      list += (names.empty() ? " (" : ", ") + name;
+      names.push_back(name);
+    }
   }
   const double share = heart.ShareWithout();
   said.push_back(
     Format(
       "The ST segment is up by %.1f mV: %.0f %% of the heart that these arteries supply lack blood",
       Ischaemia::Elevated, 100.0 * share) +
-    names + (names.empty() ? "." : ")."));
+    list + (list.empty() ? "." : ")."));
   this->Events_.push_back({ ProcedureEvent::Kind::Ischaemia, seconds,
     branches.empty() ? -1 : branches.front(), share, place });
 }

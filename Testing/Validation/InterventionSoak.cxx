@@ -17,8 +17,8 @@ using namespace coronary;
 
 namespace
 {
-// A tip that is pushed into the end of a vessel with several N presses it in: 60 N/mm. A joint that opens by more than
-// a seventh of the wire's thickness is no wire any more.
+// A tip that is pushed into the end of a vessel with several N presses it in: 60 N/mm, harder from 0.05 mm on. A
+// joint that opens by more than a seventh of the wire's thickness is no wire any more.
 constexpr double MostPenetration = 0.2;       // mm
 constexpr double MostMeanPenetration = 0.001; // mm
 constexpr double MostGap = 0.05;              // mm
