@@ -71,7 +71,7 @@ private:
 
 /// The next update is one error that has `part` in it.
 /// @param update  asks the algorithm for its data; without it, Update()
-inline void ExpectError(
+inline void ExpectFilterError(
   vtkAlgorithm* algorithm, const std::string& part, const std::function<void()>& update = nullptr)
 {
   Messages messages(algorithm);

@@ -121,7 +121,7 @@ inline vtkSmartPointer<vtkPolyData> ChainTube(int bones, double radius)
 class BendingChain : public vtkPolyDataAlgorithm
 {
 public:
-  static BendingChain* New();
+  static BendingChain* New() { VTK_STANDARD_NEW_BODY(BendingChain); }
   vtkTypeMacro(BendingChain, vtkPolyDataAlgorithm);
 
   int Bones = 4;
@@ -207,6 +207,5 @@ protected:
     return 1;
   }
 };
-vtkStandardNewMacro(BendingChain);
 
 #endif

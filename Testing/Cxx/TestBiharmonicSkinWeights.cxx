@@ -38,6 +38,8 @@
 #include <string>
 #include <vector>
 
+namespace TestBiharmonicSkinWeights
+{
 using coronary::SkinWeightInput;
 using coronary::Vector3;
 
@@ -99,7 +101,7 @@ void SetComb(vtkBiharmonicSkinWeights* filter)
 void ExpectRefusal(vtkBiharmonicSkinWeights* filter, const std::string& part)
 {
   SCOPED_TRACE(part);
-  ExpectError(filter, part);
+  ExpectFilterError(filter, part);
   EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 0);
 }
 
@@ -730,4 +732,5 @@ TEST(BiharmonicSkinWeightsFilter, TooFewIterationsAreAWarning)
   filter->Update();
   EXPECT_TRUE(messages.HasWarning("did not converge"));
   EXPECT_EQ(Field(filter->GetOutput(), "WeightsConverged"), 0.0);
+}
 }

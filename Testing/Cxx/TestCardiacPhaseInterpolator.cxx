@@ -17,6 +17,8 @@
 #include <sstream>
 #include <vector>
 
+namespace TestCardiacPhaseInterpolator
+{
 using SDDP = vtkStreamingDemandDrivenPipeline;
 using Filter = vtkCardiacPhaseInterpolator;
 
@@ -535,7 +537,7 @@ TEST(CardiacPhaseInterpolator, RefusesWithOneMessage)
   const auto refuse = [&](const std::string& part)
   {
     source->Modified();
-    ExpectError(filter, part);
+    ExpectFilterError(filter, part);
     EXPECT_EQ(Output(filter)->GetNumberOfPoints(), 0);
   };
   source->Steps = {};
@@ -571,7 +573,7 @@ TEST(CardiacPhaseInterpolator, RefusesWithOneMessage)
   const auto setting = [&](const std::string& part, const auto& set, const auto& back)
   {
     set();
-    ExpectError(filter, part);
+    ExpectFilterError(filter, part);
     back();
     Messages messages(filter);
     filter->Update();
@@ -602,12 +604,12 @@ TEST(CardiacPhaseInterpolator, RefusesWithOneMessage)
   setting(
     "TimeRange must be", [&] { filter->SetTimeRange(1.0, 1.0); },
     [&] { filter->SetTimeRange(0.0, 1.0); });
-  ExpectError(filter, "time must be finite", [&] { filter->UpdateTimeStep(nan); });
+  ExpectFilterError(filter, "time must be finite", [&] { filter->UpdateTimeStep(nan); });
   vtkNew<MovingSource> blocks;
   blocks->Blocks = true;
   vtkNew<Filter> other;
   other->SetInputConnection(blocks->GetOutputPort());
-  ExpectError(other, "composite");
+  ExpectFilterError(other, "composite");
 }
 
 TEST(CardiacPhaseInterpolator, SameBitsOnAnyNumberOfThreads)
@@ -639,4 +641,5 @@ TEST(CardiacPhaseInterpolator, Printed)
   filter->Print(text);
   EXPECT_NE(text.str().find("ListedTimes: 0.125"), std::string::npos);
   EXPECT_NE(text.str().find("MergeTolerance: 0.01"), std::string::npos);
+}
 }

@@ -33,6 +33,8 @@
 #include <string>
 #include <vector>
 
+namespace TestCenterlineConversion
+{
 namespace
 {
 using SDDP = vtkStreamingDemandDrivenPipeline;
@@ -378,4 +380,5 @@ TEST(TGF, PrintsAllSettings)
   {
     EXPECT_NE(text.str().find(std::string(name) + ":"), std::string::npos) << name;
   }
+}
 }

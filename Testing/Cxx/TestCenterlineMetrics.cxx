@@ -35,6 +35,8 @@
 #include <string>
 #include <vector>
 
+namespace TestCenterlineMetrics
+{
 namespace
 {
 /// Lines along x from 0, at the given heights and of the given lengths.
@@ -122,7 +124,7 @@ double Total(vtkTable* table, const char* column)
 void ExpectRefusal(vtkCenterlineMetrics* filter, const std::string& part)
 {
   SCOPED_TRACE(part);
-  ExpectError(filter, part);
+  ExpectFilterError(filter, part);
   EXPECT_EQ(filter->GetOutput()->GetNumberOfRows(), 0);
   EXPECT_EQ(filter->GetLines()->GetNumberOfPoints(), 0);
   EXPECT_EQ(filter->GetBranchTable()->GetNumberOfRows(), 0);
@@ -519,4 +521,5 @@ TEST(CenterlineMetrics, PrintsItsSettings)
   {
     EXPECT_NE(text.str().find(name), std::string::npos) << name;
   }
+}
 }

@@ -34,6 +34,8 @@
 #include <string>
 #include <vector>
 
+namespace TestCenterlineSkeleton
+{
 namespace
 {
 vtkSmartPointer<vtkPolyData> PhantomTree(int seed)
@@ -113,7 +115,7 @@ std::vector<std::string> NamesOf(vtkPolyData* skeleton)
 void ExpectRefusal(vtkCenterlineSkeleton* filter, const std::string& part)
 {
   SCOPED_TRACE(part);
-  ExpectError(filter, part);
+  ExpectFilterError(filter, part);
   EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 0);
 }
 }
@@ -381,4 +383,5 @@ TEST(CenterlineSkeletonRefuses, SettingsOutOfRange)
   refuse("MaximumLength", [](auto* f) { f->SetMaximumLength(5.0); });
   refuse("RadiusFactor", [=](auto* f) { f->SetRadiusFactor(nan); });
   refuse("SagittaRatio", [](auto* f) { f->SetSagittaRatio(2.0); });
+}
 }

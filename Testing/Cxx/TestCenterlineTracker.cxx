@@ -36,6 +36,8 @@
 #include <map>
 #include <vector>
 
+namespace TestCenterlineTracker
+{
 using coronary::ImageGrid;
 using coronary::Vector3;
 using SDDP = vtkStreamingDemandDrivenPipeline;
@@ -316,7 +318,7 @@ TEST(CenterlineTracker, TracksWhatIsChosen)
   scene.tracker->AddTrackedTime(0.19);
   EXPECT_EQ(StepsOf(scene.tracker), (std::vector<double>{ 0.2, 0.75 }));
   scene.tracker->RemoveAllTrackedTimes();
-  ExpectError(scene.tracker, "TrackedTimes is empty");
+  ExpectFilterError(scene.tracker, "TrackedTimes is empty");
 }
 
 TEST(CenterlineTracker, TakesLinesOfEveryPhase)
@@ -473,30 +475,30 @@ TEST(CenterlineTracker, RefusesWhatIsWrong)
 {
   {
     Scene scene({ 0.75 });
-    ExpectError(scene.tracker, "one phase only");
+    ExpectFilterError(scene.tracker, "one phase only");
   }
   {
     Scene scene({ 0.35, 0.75 });
     vtkNew<vtkReferencePhase> image;
     image->SetInputConnection(scene.phantom->GetOutputPort(Phantom::ImagePort));
     scene.tracker->SetInputConnection(image->GetOutputPort());
-    ExpectError(scene.tracker, "no time steps");
+    ExpectFilterError(scene.tracker, "no time steps");
   }
   {
     Scene scene({ 0.35, 0.75 });
     scene.tracker->AutomaticReferenceOff();
     scene.tracker->SetReferenceTime(0.6);
-    ExpectError(scene.tracker, "none of the time steps");
+    ExpectFilterError(scene.tracker, "none of the time steps");
     scene.tracker->SetReferenceTime(std::numeric_limits<double>::quiet_NaN());
-    ExpectError(scene.tracker, "ReferenceTime must be finite");
+    ExpectFilterError(scene.tracker, "ReferenceTime must be finite");
   }
   {
     Scene scene({ 0.35, 0.75 });
     scene.tracker->SetNodeSpacing(0.1);
-    ExpectError(scene.tracker, "NodeSpacing");
+    ExpectFilterError(scene.tracker, "NodeSpacing");
     scene.tracker->SetNodeSpacing(2.0);
     scene.tracker->SetImageArrayName("Density");
-    ExpectError(scene.tracker, "no point array 'Density'");
+    ExpectFilterError(scene.tracker, "no point array 'Density'");
   }
   {
     Scene scene({ 0.35, 0.75 });
@@ -513,11 +515,11 @@ TEST(CenterlineTracker, RefusesWhatIsWrong)
     vtkNew<vtkTrivialProducer> producer;
     producer->SetOutput(lines);
     scene.tracker->SetLinesConnection(producer->GetOutputPort());
-    ExpectError(scene.tracker, "outside of the image");
+    ExpectFilterError(scene.tracker, "outside of the image");
     lines->GetFieldData()->RemoveArray("PhaseTime");
     lines->Modified();
     producer->Modified();
-    ExpectError(scene.tracker, "no field array PhaseTime");
+    ExpectFilterError(scene.tracker, "no field array PhaseTime");
   }
 }
 
@@ -541,7 +543,7 @@ TEST(CenterlineTracker, RefusesSeriesThatAreNone)
   {
     images->Steps = times;
     images->Modified();
-    ExpectError(scene.tracker, message);
+    ExpectFilterError(scene.tracker, message);
   };
   steps({ 0.35, 0.35, 0.75 }, "do not increase");
   steps({ 0.75, 0.5, 0.35 }, "do not increase");
@@ -571,7 +573,7 @@ TEST(CenterlineTracker, RefusesSeriesThatAreNone)
     images->Modified();
   };
   atHalf([] { return vtkSmartPointer<vtkImageData>::New(); });
-  ExpectError(scene.tracker, "The image at the time 0.5");
+  ExpectFilterError(scene.tracker, "The image at the time 0.5");
   atHalf(
     [&]
     {
@@ -579,11 +581,12 @@ TEST(CenterlineTracker, RefusesSeriesThatAreNone)
       image->GetPointData()->Initialize();
       return image;
     });
-  ExpectError(scene.tracker, "The image at the time 0.500000 has no point array of one component");
+  ExpectFilterError(
+    scene.tracker, "The image at the time 0.500000 has no point array of one component");
   {
     atHalf([] { return nullptr; });
     Messages upstream(images);
-    ExpectError(scene.tracker, "failed");
+    ExpectFilterError(scene.tracker, "failed");
     EXPECT_TRUE(upstream.HasError("cannot read the file of 0.5"));
   }
   // It can be left out.
@@ -612,7 +615,7 @@ TEST(CenterlineTracker, RefusesSeriesThatAreNone)
   scene.tracker->SetTrackedPhases(vtkCenterlineTracker::ListedPhases);
   scene.tracker->RemoveAllTrackedTimes();
   scene.tracker->AddTrackedTime(0.5);
-  ExpectError(scene.tracker, "found in none of the phases");
+  ExpectFilterError(scene.tracker, "found in none of the phases");
 }
 
 TEST(CenterlineTracker, RefusesShapesThatAreNone)
@@ -637,7 +640,7 @@ TEST(CenterlineTracker, RefusesShapesThatAreNone)
   const auto refuse = [&](const char* message)
   {
     shapes->Modified();
-    ExpectError(scene.tracker, message);
+    ExpectFilterError(scene.tracker, message);
   };
   middle = vtkSmartPointer<vtkPolyData>::New();
   refuse("neither lines nor surfaces at the time 0.5");
@@ -697,4 +700,5 @@ TEST(CenterlineTracker, Stops)
   EXPECT_EQ(scene.tracker->GetOutput()->GetNumberOfPoints(), 0);
   EXPECT_EQ(scene.tracker->GetNumberOfTrackings(), 0);
   EXPECT_GT(scene.At(0.35)->GetNumberOfPoints(), 0);
+}
 }

@@ -37,6 +37,8 @@
 #include <string>
 #include <vector>
 
+namespace TestCoronaryPhantomSource
+{
 namespace
 {
 using Source = vtkCoronaryPhantomSource;
@@ -797,5 +799,6 @@ TEST(CoronaryPhantomSource, DefaultsAreThoseOfTheProxy)
     ++compared;
   }
   EXPECT_EQ(compared, 26);
+}
 }
 }

@@ -259,8 +259,8 @@ TEST_F(TestCoronaryPipelineSequence, TheKhronosValidatorFindsNothing)
     0)
     << ReadText(this->Folder / "stderr");
   const std::string command = "cd '" + this->Folder.string() +
-    "' && '" DYNAMICCORONARY_SCRIPTS
-    "/gltf-validator.sh' many/mesh_skin.glb many/mesh_skin.gltf one/mesh_skin.glb >stdout 2>stderr";
+    "' && '" DYNAMICCORONARY_SOURCE_DIR "/scripts/gltf-validator.sh' many/mesh_skin.glb "
+    "many/mesh_skin.gltf one/mesh_skin.glb >stdout 2>stderr";
   const int status = std::system(command.c_str());
   ASSERT_TRUE(WIFEXITED(status));
   if (WEXITSTATUS(status) == 125)

@@ -472,7 +472,7 @@ TEST_F(TestCoronarySimulator, AScriptedWithdrawalResistsThePullAndTheGuideAddsTo
     this->Put("withdrawal.json", scenario);
     ASSERT_EQ(
       this->Run("--headless --quiet --scenario withdrawal.json --output-rate 100 --output w "
-                "--script '" DYNAMICCORONARY_DRIVING "/withdrawal.json'"),
+                "--script '" DYNAMICCORONARY_SOURCE_DIR "/Testing/Data/Driving/withdrawal.json'"),
       0)
       << this->Said();
     std::istringstream table(ReadText(this->Folder / "w/forces.csv"));

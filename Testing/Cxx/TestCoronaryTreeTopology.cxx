@@ -37,6 +37,8 @@
 #include <string>
 #include <vector>
 
+namespace TestCoronaryTreeTopology
+{
 namespace
 {
 constexpr double Pi = 3.14159265358979323846;
@@ -97,7 +99,7 @@ vtkSmartPointer<vtkPolyData> MakeFork(const char* radiusName)
 void ExpectRefusal(vtkCoronaryTreeTopology* filter, const std::string& part)
 {
   SCOPED_TRACE(part);
-  ExpectError(filter, part);
+  ExpectFilterError(filter, part);
   for (int port = 0; port < 3; ++port)
   {
     EXPECT_EQ(filter->GetOutput(port)->GetNumberOfPoints(), 0);
@@ -552,4 +554,5 @@ TEST(CoronaryTreeTopology, PrintsItself)
   filter->Print(text);
   EXPECT_NE(text.str().find("PruneRatio: 3"), std::string::npos);
   EXPECT_NE(text.str().find("InputRadiusArrayName: Automatic"), std::string::npos);
+}
 }

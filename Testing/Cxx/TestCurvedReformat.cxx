@@ -23,6 +23,8 @@
 #include <cmath>
 #include <string>
 
+namespace TestCurvedReformat
+{
 using coronary::TubeImage;
 
 namespace
@@ -217,32 +219,32 @@ TEST(CurvedReformat, RefusesInOneSentence)
 {
   Case tube;
   tube.filter->SetVessel("RCA");
-  ExpectError(tube.filter, "'RCA'; it has mLAD");
+  ExpectFilterError(tube.filter, "'RCA'; it has mLAD");
   EXPECT_EQ(tube.Output(0)->GetNumberOfBlocks(), 0U);
   tube.filter->SetVessel("");
   tube.filter->SetSpacing(0.0);
-  ExpectError(tube.filter, "Spacing must be");
+  ExpectFilterError(tube.filter, "Spacing must be");
   tube.filter->SetSpacing(0.25);
   tube.filter->SetKind(5);
-  ExpectError(tube.filter, "Kind must be");
+  ExpectFilterError(tube.filter, "Kind must be");
   tube.filter->SetKind(0);
   tube.filter->SetPosition(std::nan(""));
-  ExpectError(tube.filter, "Position must be finite");
+  ExpectFilterError(tube.filter, "Position must be finite");
   tube.filter->SetPosition(1.0);
   tube.filter->SetPoint(0.0, std::nan(""), 0.0);
-  ExpectError(tube.filter, "Point must be finite");
+  ExpectFilterError(tube.filter, "Point must be finite");
   tube.filter->SetPoint(0.0, 0.0, 0.0);
   tube.filter->SetImageArrayName("Missing");
-  ExpectError(tube.filter, "'Missing'");
+  ExpectFilterError(tube.filter, "'Missing'");
   tube.filter->SetImageArrayName("Automatic");
   tube.image->SetOrigin(500.0, 0.0, 0.0);
-  ExpectError(tube.filter, "outside of the image");
+  ExpectFilterError(tube.filter, "outside of the image");
   tube.image->SetOrigin(-7.2, -7.2, -4.0);
   tube.filter->Update();
   EXPECT_EQ(tube.Output(0)->GetNumberOfBlocks(), 5U);
   tube.lines->GetPointData()->RemoveArray("MaximumInscribedSphereRadius");
   tube.lines->Modified();
-  ExpectError(tube.filter, "MaximumInscribedSphereRadius");
+  ExpectFilterError(tube.filter, "MaximumInscribedSphereRadius");
 }
 
 TEST(CurvedReformat, EmptyLinesOtherPiecesAndAborts)
@@ -261,4 +263,5 @@ TEST(CurvedReformat, EmptyLinesOtherPiecesAndAborts)
   Messages messages(filter);
   filter->Update();
   EXPECT_TRUE(messages.Errors.empty());
+}
 }

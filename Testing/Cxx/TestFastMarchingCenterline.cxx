@@ -36,6 +36,8 @@
 #include <string>
 #include <vector>
 
+namespace TestFastMarchingCenterline
+{
 using coronary::Vector3;
 
 namespace
@@ -444,4 +446,5 @@ TEST(FastMarchingCenterline, AortaAgreesWithVmtk)
   }
   std::cout << tree->GetNumberOfLines() << " branches, mean distance " << sum << " mm\n";
   EXPECT_LT(sum, 0.5 * 0.879);
+}
 }

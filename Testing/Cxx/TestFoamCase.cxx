@@ -26,6 +26,8 @@
 #include <unistd.h>
 #include <vector>
 
+namespace TestFoamCase
+{
 namespace fs = std::filesystem;
 
 namespace
@@ -220,4 +222,5 @@ TEST_F(FoamCases, CasesThatMakeNoSenseAreRefused)
   flow.cycles = 1.0;
   flow.cycle = 0.0;
   ExpectRefusal([&] { coronary::FoamCaseFiles(flow); }, "positive");
+}
 }

@@ -37,6 +37,8 @@
 #include <tuple>
 #include <vector>
 
+namespace TestFrangiVesselness
+{
 using coronary::Matrix3;
 using coronary::Vector3;
 using SDDP = vtkStreamingDemandDrivenPipeline;
@@ -217,10 +219,10 @@ std::vector<double> Field(vtkDataObject* data, const char* name)
     : std::vector<double>();
 }
 
-void ExpectRefusal(vtkFrangiVesselness* filter, const std::string& part)
+void ExpectRefused(vtkFrangiVesselness* filter, const std::string& part)
 {
   SCOPED_TRACE(part);
-  ExpectError(filter, part, [filter] { filter->UpdateWholeExtent(); });
+  ExpectFilterError(filter, part, [filter] { filter->UpdateWholeExtent(); });
   EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 0);
 }
 }
@@ -750,31 +752,31 @@ TEST(FrangiVesselness, RefusesByName)
   };
   using Filter = vtkFrangiVesselness;
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  ExpectRefusal(with([](Filter* f) { f->SetSigmaMin(0.0); }), "SigmaMin");
-  ExpectRefusal(with([&](Filter* f) { f->SetSigmaMin(nan); }), "SigmaMin");
-  ExpectRefusal(with([](Filter* f) { f->SetSigmaMax(0.1); }), "SigmaMax");
-  ExpectRefusal(with([&](Filter* f) { f->SetSigmaMax(nan); }), "SigmaMax");
-  ExpectRefusal(with([](Filter* f) { f->SetNumberOfScales(0); }), "NumberOfScales");
-  ExpectRefusal(with([](Filter* f) { f->SetScaleSpacing(2); }), "ScaleSpacing");
-  ExpectRefusal(with([](Filter* f) { f->SetMethod(-1); }), "Method");
-  ExpectRefusal(with([](Filter* f) { f->SetAlpha(0.0); }), "Alpha");
-  ExpectRefusal(with([&](Filter* f) { f->SetBeta(nan); }), "Beta");
-  ExpectRefusal(with([](Filter* f) { f->SetTau(0.4); }), "Tau");
-  ExpectRefusal(with(
+  ExpectRefused(with([](Filter* f) { f->SetSigmaMin(0.0); }), "SigmaMin");
+  ExpectRefused(with([&](Filter* f) { f->SetSigmaMin(nan); }), "SigmaMin");
+  ExpectRefused(with([](Filter* f) { f->SetSigmaMax(0.1); }), "SigmaMax");
+  ExpectRefused(with([&](Filter* f) { f->SetSigmaMax(nan); }), "SigmaMax");
+  ExpectRefused(with([](Filter* f) { f->SetNumberOfScales(0); }), "NumberOfScales");
+  ExpectRefused(with([](Filter* f) { f->SetScaleSpacing(2); }), "ScaleSpacing");
+  ExpectRefused(with([](Filter* f) { f->SetMethod(-1); }), "Method");
+  ExpectRefused(with([](Filter* f) { f->SetAlpha(0.0); }), "Alpha");
+  ExpectRefused(with([&](Filter* f) { f->SetBeta(nan); }), "Beta");
+  ExpectRefused(with([](Filter* f) { f->SetTau(0.4); }), "Tau");
+  ExpectRefused(with(
                   [](Filter* f)
                   {
                     f->AutomaticCOff();
                     f->SetC(-1.0);
                   }),
     "C must");
-  ExpectRefusal(with(
+  ExpectRefused(with(
                   [](Filter* f)
                   {
                     f->UseRegionOn();
                     f->SetRegion(100, 120, 0, 10, 0, 10);
                   }),
     "Region");
-  ExpectRefusal(
+  ExpectRefused(
     with([](Filter* f)
       { f->SetInputArrayToProcess(0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, "density"); }),
     "density");
@@ -786,9 +788,9 @@ TEST(FrangiVesselness, RefusesByName)
     change(changed);
     return MakeFilterOf(changed);
   };
-  ExpectRefusal(ofImage([](vtkImageData* i) { i->GetPointData()->Initialize(); }),
+  ExpectRefused(ofImage([](vtkImageData* i) { i->GetPointData()->Initialize(); }),
     "The image has no point array of one component");
-  ExpectRefusal(ofImage(
+  ExpectRefused(ofImage(
                   [](vtkImageData* i)
                   {
                     i->AllocateScalars(VTK_SHORT, 3);
@@ -796,7 +798,7 @@ TEST(FrangiVesselness, RefusesByName)
                     i->GetPointData()->GetScalars()->Fill(0.0);
                   }),
     "'colours' of the image has 3 components");
-  ExpectRefusal(ofImage(
+  ExpectRefused(ofImage(
                   [](vtkImageData* i)
                   {
                     i->SetDimensions(64, 48, 1);
@@ -813,7 +815,7 @@ TEST(FrangiVesselness, RefusesByName)
       i->GetPointData()->AddArray(text);
     });
   words->SetInputArrayToProcess(0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, "words");
-  ExpectRefusal(words, "'words' of the image is not numeric");
+  ExpectRefused(words, "'words' of the image is not numeric");
   const auto cells = ofImage(
     [](vtkImageData* i)
     {
@@ -824,8 +826,8 @@ TEST(FrangiVesselness, RefusesByName)
       i->GetCellData()->AddArray(values);
     });
   cells->SetInputArrayToProcess(0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_CELLS, "cells");
-  ExpectRefusal(cells, "'cells' of the image belongs to the cells");
-  ExpectRefusal(ofImage([](vtkImageData* i) { i->SetDirectionMatrix(1, 0, 0, 1, 1, 0, 0, 0, 1); }),
+  ExpectRefused(cells, "'cells' of the image belongs to the cells");
+  ExpectRefused(ofImage([](vtkImageData* i) { i->SetDirectionMatrix(1, 0, 0, 1, 1, 0, 0, 0, 1); }),
     "direction matrix");
 
   const auto ofMask = [&](const std::function<void(vtkImageData*)>& change)
@@ -837,22 +839,22 @@ TEST(FrangiVesselness, RefusesByName)
     filter->SetMaskData(mask);
     return filter;
   };
-  ExpectRefusal(ofMask([](vtkImageData* m) { m->SetSpacing(0.45, 0.5, 0.7); }), "mask");
-  ExpectRefusal(ofMask([](vtkImageData* m) { m->SetOrigin(0.0, 1.0, 0.0); }), "origin");
-  ExpectRefusal(
+  ExpectRefused(ofMask([](vtkImageData* m) { m->SetSpacing(0.45, 0.5, 0.7); }), "mask");
+  ExpectRefused(ofMask([](vtkImageData* m) { m->SetOrigin(0.0, 1.0, 0.0); }), "origin");
+  ExpectRefused(
     ofMask([](vtkImageData* m) { m->SetDirectionMatrix(0, 1, 0, 1, 0, 0, 0, 0, 1); }), "direction");
-  ExpectRefusal(ofMask(
+  ExpectRefused(ofMask(
                   [](vtkImageData* m)
                   {
                     m->SetDimensions(10, 10, 10);
                     m->AllocateScalars(VTK_UNSIGNED_CHAR, 1);
                   }),
     "extent");
-  ExpectRefusal(
+  ExpectRefused(
     ofMask([](vtkImageData* m) { m->GetPointData()->Initialize(); }), "The mask has no");
   const auto misnamed = ofMask([](vtkImageData*) {});
   misnamed->SetMaskArrayName("lumen");
-  ExpectRefusal(misnamed, "The mask has no point array 'lumen'");
+  ExpectRefused(misnamed, "The mask has no point array 'lumen'");
   misnamed->SetMaskArrayName("HU");
   EXPECT_GT(Compute(misnamed)->GetNumberOfPoints(), 0);
   EXPECT_GT(Compute(ofMask([](vtkImageData*) {}))->GetNumberOfPoints(), 0);
@@ -869,7 +871,7 @@ TEST(FrangiVesselness, RefusesByName)
 
   // Mended, it works.
   const auto mended = with([](Filter* f) { f->SetAlpha(0.0); });
-  ExpectRefusal(mended, "Alpha");
+  ExpectRefused(mended, "Alpha");
   mended->SetAlpha(0.5);
   EXPECT_GT(Compute(mended)->GetNumberOfPoints(), 0);
 }
@@ -979,4 +981,5 @@ TEST(FrangiVesselness, PrintsAllSettings)
   {
     EXPECT_NE(text.str().find(name), std::string::npos) << name;
   }
+}
 }

@@ -40,6 +40,8 @@
 #include <string>
 #include <vector>
 
+namespace TestFrenetSweepSurface
+{
 namespace
 {
 using SDDP = vtkStreamingDemandDrivenPipeline;
@@ -131,7 +133,7 @@ Array* Get(vtkFieldData* data, const char* name)
 void ExpectRefusal(vtkFrenetSweepSurface* filter, const std::string& part)
 {
   SCOPED_TRACE(part);
-  ExpectError(filter, part);
+  ExpectFilterError(filter, part);
   EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 0);
   EXPECT_EQ(filter->GetPatches()->GetNumberOfBlocks(), 0U);
   EXPECT_EQ(filter->GetCaps()->GetNumberOfPoints(), 0);
@@ -641,4 +643,5 @@ TEST(FrenetSweepSurface, Prints)
   {
     EXPECT_NE(text.str().find(name), std::string::npos);
   }
+}
 }

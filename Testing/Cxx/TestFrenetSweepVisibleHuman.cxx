@@ -30,6 +30,8 @@
 #include <string>
 #include <vector>
 
+namespace TestFrenetSweepVisibleHuman
+{
 namespace
 {
 using coronary::Vector3;
@@ -164,4 +166,5 @@ TEST(FrenetSweepVisibleHuman, Female)
 TEST(FrenetSweepVisibleHuman, Male)
 {
   SweepCoronaries("M_coronary_arteries.vtp");
+}
 }

@@ -29,6 +29,8 @@
 #include <cmath>
 #include <limits>
 
+namespace TestGatedImageReader
+{
 using namespace formattest;
 
 namespace
@@ -561,4 +563,5 @@ TEST(RealData, CardiacCt)
   EXPECT_EQ(range[0], -1064);
   EXPECT_EQ(range[1], 3343);
   EXPECT_TRUE(reader.Errors.empty());
+}
 }

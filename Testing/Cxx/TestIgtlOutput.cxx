@@ -14,6 +14,8 @@
 #include <string>
 #include <thread>
 
+namespace TestIgtlOutput
+{
 using namespace coronary;
 
 namespace
@@ -209,4 +211,5 @@ TEST(IgtlOutput, WhatIsRefused)
     },
     "3 pixels");
   ExpectRefusal([&] { output->SendImage("x", GreyImage{ 1, 1, { 1 } }, 0.0, 0.0); }, "spacing");
+}
 }

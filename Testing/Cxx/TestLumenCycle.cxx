@@ -24,6 +24,8 @@
 #include <string>
 #include <vector>
 
+namespace TestLumenCycle
+{
 using coronary::TubeImage;
 
 namespace
@@ -250,16 +252,16 @@ TEST(LumenCycle, RefusesInOneSentence)
   vtkNew<vtkLumenCycle> filter;
   filter->SetInputData(lines);
   filter->SetImageConnection(images->GetOutputPort());
-  ExpectError(filter, "ImageBlur");
+  ExpectFilterError(filter, "ImageBlur");
   EXPECT_EQ(Table(filter, 0)->GetNumberOfRows(), 0);
   filter->SetBlur(-1.0);
-  ExpectError(filter, "Blur must be");
+  ExpectFilterError(filter, "Blur must be");
   filter->SetBlur(0.4);
   filter->SetVessel("Aorta");
-  ExpectError(filter, "'Aorta'; it has mLAD");
+  ExpectFilterError(filter, "'Aorta'; it has mLAD");
   filter->SetVessel("");
   filter->SetImageArrayName("Missing");
-  ExpectError(filter, "'Missing'");
+  ExpectFilterError(filter, "'Missing'");
   filter->SetImageArrayName("");
   filter->Update();
   EXPECT_EQ(Table(filter, 0)->GetNumberOfRows(), 241);
@@ -268,5 +270,6 @@ TEST(LumenCycle, RefusesInOneSentence)
   changing->Change = true;
   vtkNew<vtkLumenCycle> other;
   other->SetInputConnection(changing->GetOutputPort());
-  ExpectError(other, "not those of the first phase");
+  ExpectFilterError(other, "not those of the first phase");
+}
 }

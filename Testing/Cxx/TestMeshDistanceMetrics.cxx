@@ -33,6 +33,8 @@
 #include <string>
 #include <vector>
 
+namespace TestMeshDistanceMetrics
+{
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
 namespace
@@ -88,7 +90,7 @@ double Field(vtkDataObject* data, const char* name)
 void ExpectRefusal(vtkMeshDistanceMetrics* filter, const std::string& part)
 {
   SCOPED_TRACE(part);
-  ExpectError(filter, part);
+  ExpectFilterError(filter, part);
   EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 0);
   EXPECT_EQ(filter->GetReferenceOutput()->GetNumberOfPoints(), 0);
   EXPECT_EQ(filter->GetTable()->GetNumberOfRows(), 0);
@@ -269,7 +271,7 @@ TEST(MeshDistanceMetrics, TimesOfBothSidesMeet)
   UpdateAt(filter, 0.28);
   EXPECT_EQ(filter->GetTable()->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP()), 0.25);
   // 0.5 against 0.6.
-  ExpectError(filter, "The result is of time 0.5, and the reference's nearest time is 0.6",
+  ExpectFilterError(filter, "The result is of time 0.5, and the reference's nearest time is 0.6",
     [&] { UpdateAt(filter, 0.5); });
   filter->SetTimeTolerance(0.11);
   UpdateAt(filter, 0.5);
@@ -428,4 +430,5 @@ TEST(MeshDistanceMetrics, PrintsItsSettings)
   {
     EXPECT_NE(text.str().find(name), std::string::npos) << name;
   }
+}
 }

@@ -33,6 +33,8 @@
 #include <set>
 #include <unistd.h>
 
+namespace TestMeshSequenceWriter
+{
 namespace fs = std::filesystem;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
@@ -1064,4 +1066,5 @@ TEST_F(TestMeshSequenceWriter, OlderFilesStayUntilAllIsWritten)
   Messages messages(this->Writer);
   EXPECT_EQ(this->Writer->Write(), 0);
   EXPECT_TRUE(messages.HasError("/proc/none"));
+}
 }

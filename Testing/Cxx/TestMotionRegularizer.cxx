@@ -17,6 +17,8 @@
 #include <sstream>
 #include <vector>
 
+namespace TestMotionRegularizer
+{
 using SDDP = vtkStreamingDemandDrivenPipeline;
 using Filter = vtkMotionRegularizer;
 
@@ -207,7 +209,7 @@ TEST(MotionRegularizer, StrainAndStressAgainstRest)
   lines->InsertNextCell(2, ids);
   other->SetLines(lines);
   filter->SetInputData(1, other);
-  ExpectError(filter, "lines at rest are not those of the input");
+  ExpectFilterError(filter, "lines at rest are not those of the input");
 }
 
 TEST(MotionRegularizer, TheInterpolatorFollows)
@@ -287,7 +289,7 @@ TEST(MotionRegularizer, RefusesWithOneMessage)
   const auto refuse = [&](const std::string& part)
   {
     source->Modified();
-    ExpectError(filter, part);
+    ExpectFilterError(filter, part);
     EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 0);
   };
   source->Steps = {};
@@ -307,7 +309,7 @@ TEST(MotionRegularizer, RefusesWithOneMessage)
   const auto setting = [&](const std::string& part, const auto& set, const auto& back)
   {
     set();
-    ExpectError(filter, part);
+    ExpectFilterError(filter, part);
     back();
     Messages messages(filter);
     filter->Update();
@@ -352,13 +354,13 @@ TEST(MotionRegularizer, RefusesWithOneMessage)
   setting(
     "ReferenceTime must", [&] { filter->SetReferenceTime(nan); },
     [&] { filter->SetReferenceTime(0.75); });
-  ExpectError(filter, "time must be finite", [&] { filter->UpdateTimeStep(nan); });
+  ExpectFilterError(filter, "time must be finite", [&] { filter->UpdateTimeStep(nan); });
   vtkNew<vtkMultiBlockDataSet> blocks;
   vtkNew<vtkPolyData> block;
   blocks->SetBlock(0, block);
   vtkNew<Filter> other;
   other->SetInputDataObject(0, blocks);
-  ExpectError(other, "composite");
+  ExpectFilterError(other, "composite");
 }
 
 TEST(MotionRegularizer, Printed)
@@ -367,4 +369,5 @@ TEST(MotionRegularizer, Printed)
   std::ostringstream text;
   filter->Print(text);
   EXPECT_NE(text.str().find("YoungsModulus: 1.55"), std::string::npos);
+}
 }

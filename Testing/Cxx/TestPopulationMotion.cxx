@@ -27,6 +27,8 @@
 #include <sstream>
 #include <string>
 
+namespace TestPopulationMotion
+{
 using SDDP = vtkStreamingDemandDrivenPipeline;
 using Filter = vtkPopulationMotion;
 
@@ -221,7 +223,7 @@ TEST(PopulationMotion, RefusesWhatItCannotUse)
     vtkNew<Filter> filter;
     filter->SetInputData(0, data);
     change(filter.Get());
-    ExpectError(filter, words);
+    ExpectFilterError(filter, words);
     EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 0);
   };
   const auto nothing = [](Filter*) {};
@@ -250,4 +252,5 @@ TEST(PopulationMotion, PrintsItself)
   std::ostringstream text;
   filter->Print(text);
   EXPECT_NE(text.str().find("Amplitude: 1"), std::string::npos);
+}
 }

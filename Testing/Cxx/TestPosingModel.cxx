@@ -14,6 +14,8 @@
 #include <fstream>
 #include <unistd.h>
 
+namespace TestPosingModel
+{
 namespace fs = std::filesystem;
 
 using coronary::JointDrag;
@@ -397,4 +399,5 @@ TEST(PosingMove, IsReadFromText)
   {
     EXPECT_THROW(coronary::PosingMoveOf(text), std::invalid_argument) << text;
   }
+}
 }

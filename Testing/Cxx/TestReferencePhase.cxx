@@ -34,6 +34,8 @@
 #include <string>
 #include <vector>
 
+namespace TestReferencePhase
+{
 using Source = vtkCoronaryPhantomSource;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
@@ -382,4 +384,5 @@ TEST(ReferencePhase, PrintsAllSettings)
   {
     EXPECT_NE(text.str().find(name), std::string::npos) << name;
   }
+}
 }

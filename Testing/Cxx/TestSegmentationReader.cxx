@@ -14,6 +14,8 @@
 
 #include <string>
 
+namespace TestSegmentationReader
+{
 using namespace formattest;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 
@@ -90,4 +92,5 @@ TEST(SegmentationReader, OneErrorThatNamesTheFault)
   expect(reader, 0.0, "PhaseFractions: 1 for 2 files");
   reader->SetFileName((folder / "none.seg.nrrd").c_str());
   expect(reader, 0.5, "none.seg.nrrd");
+}
 }

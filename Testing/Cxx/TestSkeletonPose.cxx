@@ -13,6 +13,8 @@
 
 #include <limits>
 
+namespace TestSkeletonPose
+{
 namespace
 {
 void ExpectPoint(vtkPolyData* data, vtkIdType n, double x, double y, double z)
@@ -246,7 +248,7 @@ TEST(SkeletonPose, RefusesWithOneMessage)
     filter->RemoveAllEdits();
     filter->AddEdit(1, 0, 0, 0, 0, 0, 0, 0, 1, 0);
     edit();
-    ExpectError(filter, part);
+    ExpectFilterError(filter, part);
     EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 0);
   };
   refuse("Edit 1 of Edits", [&] { filter->AddEdit(4, 0, 0, 0, 0, 0, 0, 0, 1, 0); });
@@ -257,10 +259,10 @@ TEST(SkeletonPose, RefusesWithOneMessage)
   filter->RemoveAllEdits();
   filter->MoveJointOn();
   filter->SetJoint(9);
-  ExpectError(filter, "Joint must be 0 to 3");
+  ExpectFilterError(filter, "Joint must be 0 to 3");
   filter->SetJoint(2);
   filter->SetJointPosition(nan, 0, 0);
-  ExpectError(filter, "JointPosition");
+  ExpectFilterError(filter, "JointPosition");
   filter->MoveJointOff();
   const auto line = ChainSkeleton(3);
   vtkNew<vtkCellArray> lines;
@@ -268,11 +270,12 @@ TEST(SkeletonPose, RefusesWithOneMessage)
   lines->InsertNextCell(3, ids);
   line->SetLines(lines);
   filter->SetInputData(line);
-  ExpectError(filter, "Line 0 of the skeleton has 3 points");
+  ExpectFilterError(filter, "Line 0 of the skeleton has 3 points");
   filter->SetInputData(ChainSkeleton(3));
   filter->SetInputData(1, ChainSkeleton(2));
-  ExpectError(filter, "3 joints and 2 bones");
+  ExpectFilterError(filter, "3 joints and 2 bones");
   filter->SetInputData(1, ChainSkeleton(3));
   filter->Update();
   EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 4);
+}
 }

@@ -23,6 +23,8 @@
 
 #include <limits>
 
+namespace TestSkinDeformation
+{
 namespace
 {
 using SDDP = vtkStreamingDemandDrivenPipeline;
@@ -600,7 +602,7 @@ TEST(SkinDeformation, RefusesWithOneMessage)
     filter->SetInputData(0, tube);
     filter->SetInputData(1, rest);
     filter->SetInputData(2, pose);
-    ExpectError(filter, part);
+    ExpectFilterError(filter, part);
     EXPECT_EQ(Output(filter)->GetNumberOfPoints(), 0);
   };
   using Data = vtkSmartPointer<vtkPolyData>;
@@ -666,4 +668,5 @@ TEST(SkinDeformation, RefusesWithOneMessage)
   filter->Modified();
   filter->Update();
   EXPECT_GT(Output(filter)->GetNumberOfPoints(), 0);
+}
 }

@@ -21,6 +21,8 @@
 #include <map>
 #include <sstream>
 
+namespace TestSurfaceCleaner
+{
 namespace
 {
 /// A tube of quadrangles along z with radius 1 and length 8, with a vertex and a line besides.
@@ -110,7 +112,7 @@ void ExpectClean(vtkPolyData* surface)
 void ExpectRefusal(vtkSurfaceCleaner* filter, const std::string& part)
 {
   SCOPED_TRACE(part);
-  ExpectError(filter, part);
+  ExpectFilterError(filter, part);
   EXPECT_EQ(filter->GetOutput()->GetNumberOfPoints(), 0);
 }
 }
@@ -299,4 +301,5 @@ TEST(SurfaceCleaner, ForeignSurfacesComeOutClosedAndAreMeshed)
     EXPECT_GE(Field(mesher->GetOutput(), "MeshMinimumDihedralAngle"), 5.0 * M_PI / 180.0);
     EXPECT_LE(Field(mesher->GetOutput(), "PoorFraction"), 0.01);
   }
+}
 }

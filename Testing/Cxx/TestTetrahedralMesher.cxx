@@ -28,6 +28,8 @@
 #include <string>
 #include <vector>
 
+namespace TestTetrahedralMesher
+{
 namespace
 {
 /// The unit cube's surface; entity 1 on the sides, 2 below, 3 above.
@@ -77,7 +79,7 @@ vtkSmartPointer<vtkPolyData> Line(const std::vector<std::array<double, 3>>& plac
 void ExpectRefusal(vtkTetrahedralMesher* filter, const std::string& part)
 {
   SCOPED_TRACE(part);
-  ExpectError(filter, part);
+  ExpectFilterError(filter, part);
   EXPECT_EQ(filter->GetOutput()->GetNumberOfCells(), 0);
   EXPECT_EQ(filter->GetBoundary()->GetNumberOfPoints(), 0);
   EXPECT_EQ(filter->GetEdges()->GetNumberOfPoints(), 0);
@@ -307,4 +309,5 @@ TEST(TetrahedralMesherPrints, ItsSettings)
   {
     EXPECT_NE(text.str().find(name), std::string::npos) << name;
   }
+}
 }

@@ -28,6 +28,8 @@
 #include <map>
 #include <string>
 
+namespace TestVesselEdits
+{
 namespace
 {
 constexpr double Time = 0.75;
@@ -257,7 +259,7 @@ TEST(VesselEdits, AFileAndAListAreOneList)
   EXPECT_TRUE(output->GetFieldData()->HasArray("Warnings"));
   std::remove(path.c_str());
   edits->Modified();
-  ExpectError(edits, path);
+  ExpectFilterError(edits, path);
 }
 
 TEST(VesselEdits, AMaskIsPaintedAndErased)
@@ -292,7 +294,7 @@ TEST(VesselEdits, AMaskIsPaintedAndErased)
   edits->SetNumberOfPoints(1);
   edits->SetPoint(0, 9.0, 9.0, 9.0);
   edits->SetRadius(1.0);
-  ExpectError(edits, "dit 3 (erase): nothing of the mask is around (9.0, 9.0, 9.0)");
+  ExpectFilterError(edits, "dit 3 (erase): nothing of the mask is around (9.0, 9.0, 9.0)");
 }
 
 TEST(VesselEdits, Refusals)
@@ -300,19 +302,20 @@ TEST(VesselEdits, Refusals)
   vtkNew<vtkVesselEdits> edits;
   edits->SetInputData(Tree());
   edits->AddEdit(R"({"edit": "cut", "points": [[1000, 0, 0]]})");
-  ExpectError(edits, "dit 1 (cut): no vessel of the tree is within");
+  ExpectFilterError(edits, "dit 1 (cut): no vessel of the tree is within");
   EXPECT_EQ(vtkPolyData::SafeDownCast(edits->GetOutputDataObject(0))->GetNumberOfPoints(), 0);
   edits->RemoveAllEdits();
   edits->AddEdit("{");
-  ExpectError(edits, "not JSON");
+  ExpectFilterError(edits, "not JSON");
   edits->RemoveAllEdits();
   edits->SetKind(vtkVesselEdits::JoinEdit);
-  ExpectError(edits, "2 points, not 0");
+  ExpectFilterError(edits, "2 points, not 0");
   edits->SetKind(vtkVesselEdits::NoEdit);
   // An empty tree is a normal piece of a pipeline.
   vtkNew<vtkPolyData> empty;
   edits->SetInputData(empty);
   edits->Update();
   EXPECT_EQ(vtkPolyData::SafeDownCast(edits->GetOutputDataObject(0))->GetNumberOfPoints(), 0);
+}
 }
 }

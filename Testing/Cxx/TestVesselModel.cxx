@@ -13,6 +13,8 @@
 #include <fstream>
 #include <unistd.h>
 
+namespace TestVesselModel
+{
 namespace fs = std::filesystem;
 
 using coronary::Vector3;
@@ -246,4 +248,5 @@ TEST_F(TestVesselModel, NamesWhatIsBroken)
   const char* fault = "is no tree of centerlines";
 #endif
   this->ExpectFailure("centerline.vtp", fault);
+}
 }

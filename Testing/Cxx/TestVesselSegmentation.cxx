@@ -35,6 +35,8 @@
 #include <string>
 #include <vector>
 
+namespace TestVesselSegmentation
+{
 using coronary::Vector3;
 using SDDP = vtkStreamingDemandDrivenPipeline;
 using Extent = std::array<int, 6>;
@@ -463,4 +465,5 @@ TEST(VesselSegmentation, PrintsItsSettings)
   {
     EXPECT_NE(text.str().find(word), std::string::npos) << word;
   }
+}
 }

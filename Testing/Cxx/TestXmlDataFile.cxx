@@ -22,6 +22,8 @@
 
 #include <string>
 
+namespace TestXmlDataFile
+{
 using coronary::ReadableXmlData;
 
 namespace
@@ -215,4 +217,5 @@ TEST(XmlDataFile, DamagedTextsDoNoHarm)
       }
     }
   }
+}
 }

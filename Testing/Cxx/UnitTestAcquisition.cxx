@@ -11,6 +11,8 @@
 #include <limits>
 #include <string>
 
+namespace UnitTestAcquisition
+{
 using namespace coronary;
 
 TEST(ExposureClock, cadenceIsExact)
@@ -237,4 +239,5 @@ TEST(ExposureClock, refusesWhatIsNotPossible)
   ExpectRefusal([&] { clock.SetFieldArea(nan); }, "area");
   ExpectRefusal([] { FrameRateOf(10.0); }, "7.5, 15 or 30");
   EXPECT_DOUBLE_EQ(FramesPerSecond(FrameRateOf(7.5)), 7.5);
+}
 }

@@ -10,6 +10,8 @@
 #include <cmath>
 #include <iterator>
 
+namespace UnitTestAttenuation
+{
 using namespace coronary;
 
 namespace
@@ -140,4 +142,5 @@ TEST(Attenuation, RefusesWhatXraysAreNot)
   ExpectRefusal([] { Attenuation(NAN); }, "effective energy");
   ExpectRefusal([] { Attenuation(60.0, 200.0); }, "CT's effective energy");
   ExpectRefusal([] { Attenuation().OfContrastMedium(-1.0); }, "iodine");
+}
 }

@@ -14,6 +14,8 @@
 #include <thread>
 #include <vector>
 
+namespace UnitTestBackgroundCache
+{
 using namespace coronary;
 
 namespace
@@ -299,4 +301,5 @@ TEST(BackgroundCache, RefusesImpossibleSettings)
   ExpectRefusal([&] { with([](auto& s) { s.bandRows = 0; }); }, "band");
   ExpectRefusal([&] { with([](auto& s) { s.angleStep = NAN; }); }, "angles");
   ExpectRefusal([&] { with([](auto& s) { s.lengthStep = 0.0; }); }, "lengths");
+}
 }

@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+namespace UnitTestBackgroundVolume
+{
 using namespace coronary;
 
 namespace
@@ -211,4 +213,5 @@ TEST(BackgroundVolume, refusesPlacementsThatAreNone)
   placement.offset.x() = std::numeric_limits<double>::quiet_NaN();
   ExpectRefusal([&] { ReadBackgroundVolume(path, placement); }, "offset");
   EXPECT_THROW(ReadBackgroundVolume(path, {}, [](double) { return false; }), Cancelled);
+}
 }

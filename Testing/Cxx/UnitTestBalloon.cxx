@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+namespace UnitTestBalloon
+{
 using namespace coronary;
 
 namespace
@@ -448,8 +450,8 @@ TEST(Lesions, NarrowTheMovingWall)
 // Recorded hands: an angiogram, wire through the lesion, balloon inflated and withdrawn, an angiogram.
 TEST(Lesions, TheRecordedDilationRepeatsToTheBit)
 {
-  auto source =
-    std::make_unique<ReplaySource>(std::string(DYNAMICCORONARY_DRIVING) + "/lad-lesion.pcirec");
+  auto source = std::make_unique<ReplaySource>(
+    std::string(DYNAMICCORONARY_SOURCE_DIR) + "/Testing/Data/Driving/lad-lesion.pcirec");
   const ReplaySource* replay = source.get();
   const Scenario scenario =
     ScenarioFromText(source->Reader().Header().scenario, "The recording", ".");
@@ -521,4 +523,5 @@ TEST(Lesions, ABalloonThatIsTooThickForTheGuideIsRefused)
     EXPECT_NE(std::string(error.what()).find("is thicker"), std::string::npos) << error.what();
     EXPECT_NE(std::string(error.what()).find("'JL4-4F'"), std::string::npos) << error.what();
   }
+}
 }

@@ -13,6 +13,8 @@
 #include <limits>
 #include <utility>
 
+namespace UnitTestBeatingModel
+{
 using namespace coronary;
 
 namespace
@@ -237,4 +239,5 @@ TEST(BeatingModel, Refusals)
   ExpectRefusal([&]
     { model.Positions(std::numeric_limits<double>::quiet_NaN(), positions.data()); },
     "must be finite");
+}
 }

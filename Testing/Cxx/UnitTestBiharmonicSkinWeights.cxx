@@ -11,6 +11,8 @@
 #include <numeric>
 #include <stdexcept>
 
+namespace UnitTestBiharmonicSkinWeights
+{
 using namespace coronary;
 
 namespace
@@ -662,4 +664,5 @@ TEST(BiharmonicSkinWeights, BadInput)
   EXPECT_TRUE(Contains(refused([](auto& s) { s.neighbourhood = -1; }), "neighbourhood"));
   EXPECT_TRUE(Contains(refused([](auto& s) { s.penalty = 0.0; }), "penalty"));
   EXPECT_TRUE(Contains(refused([](auto& s) { s.mode = static_cast<SkinWeightMode>(9); }), "mode"));
+}
 }

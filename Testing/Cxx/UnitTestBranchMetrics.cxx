@@ -8,6 +8,8 @@
 #include <cmath>
 #include <limits>
 
+namespace UnitTestBranchMetrics
+{
 using namespace coronary;
 
 namespace
@@ -305,4 +307,5 @@ TEST(BranchMetrics, LoopsAndDoubledLinesEnd)
   dots.lines = { { 0 }, { 0, 1 }, {} };
   EXPECT_TRUE(FindBranches(dots).empty());
   EXPECT_EQ(CompareBranches(dots, Reference()).completenessRatio, 0.0);
+}
 }

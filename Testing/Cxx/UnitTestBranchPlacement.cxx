@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+namespace UnitTestBranchPlacement
+{
 using namespace coronary;
 
 namespace
@@ -263,5 +265,6 @@ TEST(BranchPlacement, RefusesOtherLines)
     std::invalid_argument);
   EXPECT_THROW(SignsOfPlacement(lines, { {}, {}, {}, { {}, {} } }, AtRest(lines), { 0.5, 0.1 }),
     std::invalid_argument);
+}
 }
 }

@@ -12,6 +12,8 @@
 
 #include <cmath>
 
+namespace UnitTestCArm
+{
 using namespace coronary;
 
 namespace
@@ -164,4 +166,5 @@ TEST(CArm, ViewsHaveTheirNames)
   EXPECT_EQ(ViewName(pose), "LAO 45 CAU 25");
   // Which is where the beam goes.
   EXPECT_LT((BeamDirection(pose) - CArmGeometry(pose, {}).TowardsDetector()).norm(), 1e-12);
+}
 }

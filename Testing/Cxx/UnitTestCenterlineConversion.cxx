@@ -13,6 +13,8 @@
 #include <stdexcept>
 #include <string>
 
+namespace UnitTestCenterlineConversion
+{
 using namespace coronary;
 
 namespace
@@ -226,4 +228,5 @@ TEST(CenterlineConversion, WhatCanNotBeUsedIsNamed)
   has(complaint([](Tracts& t) { t[1].tractId = 0; }), "as another one");
   has(complaint([](Tracts& t) { t[0].tractId = 700; }), "has no tract 0");
   has(complaint([](Tracts& t) { t[1].points.front().x() += 1.0; }), "does not begin where group");
+}
 }

@@ -16,6 +16,8 @@
 #include <map>
 #include <stdexcept>
 
+namespace UnitTestCenterlineExtraction
+{
 using namespace coronary;
 
 namespace
@@ -825,4 +827,5 @@ TEST(CenterlineExtraction, DegenerateImages)
   EXPECT_THROW(ExtractCenterlines(input, settings), std::invalid_argument);
   settings = {};
   EXPECT_THROW(ExtractCenterlines(input, settings, [](double) { return false; }), Cancelled);
+}
 }

@@ -16,6 +16,8 @@
 #include <stdexcept>
 #include <string>
 
+namespace UnitTestCenterlineOverlap
+{
 using namespace coronary;
 
 namespace
@@ -740,4 +742,5 @@ TEST(CenterlineOverlap, Cancel)
       return true;
     });
   EXPECT_EQ(last, 1.0);
+}
 }

@@ -11,6 +11,8 @@
 #include <set>
 #include <stdexcept>
 
+namespace UnitTestCenterlineSkeleton
+{
 using namespace coronary;
 
 namespace
@@ -217,4 +219,5 @@ TEST(CenterlineSkeleton, BadInput)
   tree.points[3][1] = std::numeric_limits<double>::infinity();
   EXPECT_THROW(MakeCenterlineSkeleton(tree), std::invalid_argument);
   EXPECT_TRUE(MakeCenterlineSkeleton(VesselTree()).bones.empty());
+}
 }

@@ -14,6 +14,8 @@
 #include <map>
 #include <set>
 
+namespace UnitTestCenterlineTopology
+{
 using namespace coronary;
 
 namespace
@@ -637,4 +639,5 @@ TEST(CenterlineTopology, NothingAndNonsense)
   settings.murrayExponent = std::nan("");
   EXPECT_NE(message(good, settings).find("Murray"), std::string::npos);
   EXPECT_THROW(BuildTopology(good, {}, {}, [](double) { return false; }), Cancelled);
+}
 }

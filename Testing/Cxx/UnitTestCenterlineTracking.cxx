@@ -20,6 +20,8 @@
 #include <random>
 #include <stdexcept>
 
+namespace UnitTestCenterlineTracking
+{
 using namespace coronary;
 
 namespace
@@ -994,4 +996,5 @@ TEST(CenterlineTracking, RefusesWhatIsWrong)
                  },
                  {}, nullptr, [](double) { return false; }),
     Cancelled);
+}
 }

@@ -18,6 +18,8 @@
 #include <unistd.h>
 #include <vector>
 
+namespace UnitTestCineRuns
+{
 using coronary::CineRuns;
 using coronary::XrayAngiogram;
 namespace fs = std::filesystem;
@@ -314,4 +316,5 @@ TEST(CineRuns, AreHandedOverWholeOrInParts)
   EXPECT_EQ(NameOfCineFile(taken[1]), "cine_01_3.dcm");
   EXPECT_EQ(taken[1].width, 250.0);
   EXPECT_EQ(taken[0].frames.size(), 1U);
+}
 }

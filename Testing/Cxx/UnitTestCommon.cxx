@@ -23,6 +23,8 @@
 #include <thread>
 #include <vector>
 
+namespace UnitTestCommon
+{
 using namespace coronary;
 
 namespace
@@ -323,4 +325,5 @@ TEST(Require, SaysWhoseSettingIsWrong)
     "SomeSettings: depth is 7.000000; it has to be 0 to 1 mm");
   ExpectRefusal([&] { require.Range("depth", std::numeric_limits<double>::quiet_NaN(), 0.0, 1.0); },
     "SomeSettings: depth must be from 0.000000 to 1.000000");
+}
 }

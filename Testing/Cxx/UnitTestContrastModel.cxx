@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+namespace UnitTestContrastModel
+{
 using namespace coronary;
 
 namespace
@@ -506,5 +508,6 @@ TEST(ContrastModel, RefusesBadInput)
   settings = {};
   settings.flowDepression = 2.0;
   EXPECT_THROW(settings.Validate(), std::invalid_argument);
+}
 }
 }

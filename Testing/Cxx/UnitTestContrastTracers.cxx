@@ -16,6 +16,8 @@
 #include <string>
 #include <vector>
 
+namespace UnitTestContrastTracers
+{
 using namespace coronary;
 
 namespace
@@ -467,5 +469,6 @@ TEST(ContrastTracers, RefusesBadSettings)
   {
     EXPECT_THROW(ContrastTracers(network, bad, 1), std::invalid_argument);
   }
+}
 }
 }

@@ -13,6 +13,8 @@
 #include <string>
 #include <vector>
 
+namespace UnitTestCoronaryFlow
+{
 using namespace coronary;
 
 namespace
@@ -433,5 +435,6 @@ TEST(CoronaryFlow, RefusesBadInput)
   EXPECT_THROW(flow.Step(Dt, 0.0, 75.0, -1.0), std::invalid_argument);
   EXPECT_THROW(flow.Step(Dt, 0.0, 75.0, 1.0, { 9, 0.0 }), std::invalid_argument);
   EXPECT_THROW(flow.Step(Dt, 0.0, 75.0, 1.0, { 0, NAN }), std::invalid_argument);
+}
 }
 }

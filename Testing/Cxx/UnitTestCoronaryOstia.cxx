@@ -13,6 +13,8 @@
 #include <limits>
 #include <string>
 
+namespace UnitTestCoronaryOstia
+{
 using namespace coronary;
 
 namespace
@@ -426,4 +428,5 @@ TEST(CoronaryOstia, ReportsAndStopsSoon)
       Cancelled);
     EXPECT_LT(std::chrono::steady_clock::now() - told, std::chrono::seconds(2)) << until;
   }
+}
 }

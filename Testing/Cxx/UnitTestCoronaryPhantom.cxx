@@ -17,6 +17,8 @@
 #include <set>
 #include <string_view>
 
+namespace UnitTestCoronaryPhantom
+{
 using namespace coronary;
 
 namespace
@@ -968,4 +970,5 @@ TEST(CoronaryPhantom, StopsWhenTold)
   EXPECT_THROW(phantom.Surface(0.1, stop), Cancelled);
   // A later call is not spoilt by the one that was stopped.
   EXPECT_GT(phantom.Surface(0.1).points.size(), 1000u);
+}
 }

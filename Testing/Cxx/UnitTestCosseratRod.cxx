@@ -9,6 +9,8 @@
 #include <functional>
 #include <string>
 
+namespace UnitTestCosseratRod
+{
 using namespace coronary;
 
 namespace
@@ -811,4 +813,5 @@ TEST(CosseratRod, RepeatsBitForBit)
       EXPECT_EQ(first, rod.Hash());
     }
   }
+}
 }

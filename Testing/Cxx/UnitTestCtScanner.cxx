@@ -15,6 +15,8 @@
 #include <tuple>
 #include <utility>
 
+namespace UnitTestCtScanner
+{
 using namespace coronary;
 
 namespace
@@ -957,4 +959,5 @@ TEST(CtScanner, SeesTheHeart)
     SetNumberOfThreads(0);
     EXPECT_EQ(image, again);
   }
+}
 }

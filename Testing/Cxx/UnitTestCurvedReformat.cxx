@@ -12,6 +12,8 @@
 #include <limits>
 #include <string>
 
+namespace UnitTestCurvedReformat
+{
 using namespace coronary;
 
 namespace
@@ -437,4 +439,5 @@ TEST(FindVessel, FromTheOstiumToTheTipByName)
   EXPECT_EQ(find("").name, "LM, pLCx"); // the longest, 70 mm
   ExpectRefusal([&] { find("RCA"); }, "RCA", "pLCx", "D1");
   ExpectRefusal([&] { FindVessel(named.tree, { "one" }, ""); }, "number of names");
+}
 }

@@ -16,6 +16,8 @@
 #include <limits>
 #include <string>
 
+namespace UnitTestDetector
+{
 using namespace coronary;
 
 namespace
@@ -602,4 +604,5 @@ TEST(FluoroscopyImager, refusesWhatIsNotPossible)
     imager.Expose(LineIntegrals(13, 7), LineIntegrals(13, 7), LineIntegrals(13, 7), Frame(1))
       .values.size(),
     91U);
+}
 }

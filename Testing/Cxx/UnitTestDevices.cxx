@@ -23,6 +23,8 @@
 #include <string>
 #include <vector>
 
+namespace UnitTestDevices
+{
 using namespace coronary;
 
 namespace
@@ -1158,4 +1160,5 @@ TEST(TripleBuffer, LatestWhole)
   EXPECT_EQ(value, 2);
   EXPECT_FALSE(buffer.Read(value));
   EXPECT_EQ(value, 2);
+}
 }

@@ -10,6 +10,8 @@
 #include <limits>
 #include <numeric>
 
+namespace UnitTestDistanceTransform
+{
 using namespace coronary;
 
 namespace
@@ -271,4 +273,5 @@ TEST(DistanceTransform, ReportsAndStops)
       SquaredDistanceTransform(mask.values.data(), mask.size, mask.spacing, stop), Cancelled);
     EXPECT_THROW(OpenWithBall(mask.values.data(), mask.size, mask.spacing, 1.0, stop), Cancelled);
   }
+}
 }

@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+namespace UnitTestEditsFile
+{
 using namespace coronary;
 
 namespace
@@ -92,5 +94,6 @@ TEST(EditsFile, WhatIsWrongIsNamed)
     { ParseEdits(R"({"format": "coronary edits", "version": 2, "edits": []})", "my.json"); },
     "version is 2", "reads 1");
   ExpectError([] { ReadEditsFile("/does/not/exist.json"); }, "/does/not/exist.json");
+}
 }
 }

@@ -10,6 +10,8 @@
 #include <cmath>
 #include <sstream>
 
+namespace UnitTestEvaluation
+{
 using namespace coronary;
 
 namespace
@@ -288,4 +290,5 @@ TEST(Evaluation, Tables)
   EXPECT_EQ(LinesWith(text, "4.96  1.78  1.82  0.84"), 1u);
 
   EXPECT_EQ(LinesWith(BranchCsv(cases), ",4,\"pLAD\",12.5000,"), 2u);
+}
 }

@@ -16,6 +16,8 @@
 #include <stdexcept>
 #include <string>
 
+namespace UnitTestExchangeFormats
+{
 using namespace coronary;
 using namespace formattest;
 
@@ -409,4 +411,5 @@ TEST(SeriesDescriptionMask, IsKept)
     folder / "bad.json", "{\"phases\": [{\"fraction\": 0, \"image\": \"a.mha\", \"mask\": 3}]}");
   ExpectError(
     [&] { (void)ReadSeriesDescription(folder / "bad.json"); }, "phases[0].mask is not a text");
+}
 }

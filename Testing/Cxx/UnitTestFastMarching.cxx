@@ -17,6 +17,8 @@
 #include <stdexcept>
 #include <vector>
 
+namespace UnitTestFastMarching
+{
 using namespace coronary;
 
 namespace
@@ -402,4 +404,5 @@ TEST(VoxelRegion, JoinsWhatTouchesByEdgesAndCorners)
   const std::uint32_t size = region.Size();
   region.JoinDiagonals();
   EXPECT_EQ(region.Size(), size);
+}
 }

@@ -18,6 +18,8 @@
 #include <stdexcept>
 #include <unistd.h>
 
+namespace UnitTestFileSeries
+{
 namespace fs = std::filesystem;
 
 namespace
@@ -330,4 +332,5 @@ TEST(StagedFolder, RemovesWhatKilledProcessesLeft)
   }
   EXPECT_FALSE(std::filesystem::exists(folder / ".unfinished-killed"));
   EXPECT_TRUE(std::filesystem::exists(inTheMaking)) << "someone works there";
+}
 }

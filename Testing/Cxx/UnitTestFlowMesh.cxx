@@ -10,6 +10,8 @@
 #include <cmath>
 #include <set>
 
+namespace UnitTestFlowMesh
+{
 using coronary::Vector3;
 
 namespace
@@ -390,4 +392,5 @@ TEST(OutletModel, BadSettingsAreRefused)
   settings = {};
   settings.venousPressure = 90.0;
   ExpectRefusal([&] { coronary::MakeOutletModel({ 1.0 }, settings); }, "venousPressure");
+}
 }

@@ -26,6 +26,8 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 
+namespace UnitTestFormats
+{
 using namespace coronary;
 using namespace formattest;
 
@@ -807,8 +809,6 @@ TEST(GatedSeries, DescriptionListsPhases)
   ExpectMessage(MessageOfReading(folder / "bad.json"), { "none.mha' does not exist" });
 }
 
-namespace
-{
 // A folder of phases x slices; `change` may alter an image or, returning false, leave it out.
 void WriteDicomFolder(const TemporaryFolder& folder, const std::string& name, int phases,
   int slices, const std::function<bool(DicomOptions&)>& change = {})
@@ -836,7 +836,6 @@ void WriteDicomFolder(const TemporaryFolder& folder, const std::string& name, in
       }
     }
   }
-}
 }
 
 TEST(Dicom, PhasesAndPositionsAreSorted)
@@ -1197,4 +1196,5 @@ TEST(Fuzz, DamagedHeadersNeverCrash)
   // Kilobytes: no header may make us allocate what the file can not hold.
   EXPECT_LT(usage.ru_maxrss, 400000);
 #endif
+}
 }

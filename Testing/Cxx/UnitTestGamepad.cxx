@@ -12,6 +12,8 @@
 #include <unistd.h>
 #include <vector>
 
+namespace UnitTestGamepad
+{
 using namespace coronary;
 
 namespace
@@ -232,4 +234,5 @@ TEST(Gamepad, NothingThere)
   const DeviceStatus status = WaitWhileConnecting(file, 5.0);
   EXPECT_EQ(status.state, DeviceState::Refused);
   EXPECT_NE(status.text.find("no game controller"), std::string::npos);
+}
 }

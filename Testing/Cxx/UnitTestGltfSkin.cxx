@@ -12,6 +12,8 @@
 #include <numeric>
 #include <random>
 
+namespace UnitTestGltfSkin
+{
 using coronary::GltfModel;
 using coronary::GltfSkin;
 using coronary::Vector3;
@@ -328,4 +330,5 @@ TEST(GltfSkin, Refusals)
   refuse("needs triangles", 4, [](GltfModel& model) { model.faces.clear(); });
   refuse("cycle", 4, [](GltfModel& model) { model.cycleLength = 0.0; });
   refuse("number of bones", 4, [](GltfModel& model) { model.keys.emplace_back(); });
+}
 }

@@ -8,6 +8,8 @@
 #include <limits>
 #include <stdexcept>
 
+namespace UnitTestHeartRegion
+{
 using namespace coronary;
 
 namespace
@@ -128,5 +130,6 @@ TEST(HeartRegion, VoxelsWithoutValueAreNotSolid)
     values[p] = std::numeric_limits<float>::quiet_NaN();
   }
   EXPECT_NEAR(HeartRegion({ values.data(), chest.grid }, Ostia).Share(), region.Share(), 0.01);
+}
 }
 }

@@ -10,6 +10,8 @@
 #include <fstream>
 #include <iterator>
 
+namespace UnitTestInstrumentCatalogue
+{
 using coronary::BuiltInCatalogue;
 using coronary::CatalogueFromText;
 using nlohmann::json;
@@ -20,7 +22,7 @@ constexpr double GramForce = 9.80665e-3;
 
 json BuiltInJson()
 {
-  std::ifstream file(DYNAMICCORONARY_INSTRUMENTS);
+  std::ifstream file(DYNAMICCORONARY_SOURCE_DIR "/Simulator/Session/instruments.json");
   return json::parse(std::string(std::istreambuf_iterator<char>(file), {}));
 }
 
@@ -182,4 +184,5 @@ TEST(UnitTestInstrumentCatalogue, RefusesWithThePlace)
   EXPECT_THROW(CatalogueFromText("{", "'own.json'"), std::runtime_error);
   EXPECT_THROW(CatalogueFromText(std::string(100000, '['), "'own.json'"), std::runtime_error);
   EXPECT_THROW(coronary::ReadCatalogue("/no/such/file.json"), std::runtime_error);
+}
 }

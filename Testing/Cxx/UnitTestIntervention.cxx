@@ -15,6 +15,8 @@
 #include <string>
 #include <vector>
 
+namespace UnitTestIntervention
+{
 using namespace coronary;
 
 namespace
@@ -142,8 +144,8 @@ class Replay : public testing::TestWithParam<std::array<const char*, 4>>
 TEST_P(Replay, ReachesItsBranch)
 {
   const auto& [file, wire, artery, wanted] = this->GetParam();
-  RecordingReplay replay(
-    RecordingReader(std::string(DYNAMICCORONARY_DRIVING) + "/" + file + ".pcirec"));
+  RecordingReplay replay(RecordingReader(
+    std::string(DYNAMICCORONARY_SOURCE_DIR) + "/Testing/Data/Driving/" + file + ".pcirec"));
   Intervention intervention(Phantom(), Wire(wire),
     Catheter(std::string(artery) == "RCA" ? "JR4-6F" : "EBU3.5-6F"), SettingsFor(artery));
   coronary::SessionInput input;
@@ -338,4 +340,5 @@ TEST(FixedStepClock, FollowsRealTimeAndGivesUpWhatIsLost)
   EXPECT_EQ(12, clock.Steps());
   EXPECT_THROW(FixedStepClock(0.0), std::invalid_argument);
   EXPECT_THROW(FixedStepClock(100.0, -1.0), std::invalid_argument);
+}
 }

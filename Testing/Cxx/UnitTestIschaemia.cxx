@@ -8,6 +8,8 @@
 #include <cmath>
 #include <numeric>
 
+namespace UnitTestIschaemia
+{
 using namespace coronary;
 
 namespace
@@ -206,4 +208,5 @@ TEST(Electrocardiogram, IsLiftedBetweenSAndT)
       EXPECT_LT(lifted, 0.004) << phase;
     }
   }
+}
 }

@@ -10,6 +10,8 @@
 #include <cmath>
 #include <set>
 
+namespace UnitTestLooseVessels
+{
 using namespace coronary;
 
 namespace
@@ -267,4 +269,5 @@ TEST_F(LooseVessels, WithoutContrastOrTreeThereIsNoMeasure)
     std::invalid_argument);
   EXPECT_THROW(
     FindLooseVessels({ image, nullptr, none, HeartPose(), 50.0, 420.0 }), std::invalid_argument);
+}
 }

@@ -10,6 +10,8 @@
 #include <limits>
 #include <random>
 
+namespace UnitTestLumenCycle
+{
 using namespace coronary;
 
 namespace
@@ -172,4 +174,5 @@ TEST(GradeOverCycle, TheSameOnAnyNumberOfThreadsAndNoneOfWhatDoesNotFit)
   short1[2].radius.pop_back();
   ExpectRefusal([&] { GradeOverCycle(tree, Times, short1); }, "one value a point");
   EXPECT_THROW(GradeOverCycle(tree, Times, lumens, [](double) { return false; }), Cancelled);
+}
 }

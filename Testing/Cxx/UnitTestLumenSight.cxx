@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <vector>
 
+namespace UnitTestLumenSight
+{
 using namespace coronary;
 
 namespace
@@ -120,5 +122,6 @@ TEST(LumenSight, RefusesOtherPoints)
   const Tube tube(10.0);
   const Polylines lines = LinesAt({ 10.0 });
   EXPECT_THROW(SeeLumens(tube.View(), lines, {}), std::invalid_argument);
+}
 }
 }

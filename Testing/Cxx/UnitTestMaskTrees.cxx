@@ -6,6 +6,8 @@
 
 #include <cmath>
 
+namespace UnitTestMaskTrees
+{
 using namespace coronary;
 
 namespace
@@ -123,4 +125,5 @@ TEST(MaskTrees, WhatCanNotBe)
     body[n] = found.vessels[n] != 0 ? 0 : body[n];
   }
   EXPECT_THROW(FindMaskTrees(scene.grid, body, 4.5), std::invalid_argument);
+}
 }

@@ -11,6 +11,8 @@
 #include <map>
 #include <utility>
 
+namespace UnitTestMeshAnatomy
+{
 using namespace coronary;
 
 namespace
@@ -427,4 +429,5 @@ TEST(MeshAnatomy, RefusesWhatIsNotASolid)
   const MeshAnatomy anatomy({ turned }, 0.8);
   EXPECT_GT(Mass(Rendered(anatomy, Voxels(20.0, 300.0)), 1), 1e6);
   EXPECT_GT(anatomy.Trunk().width, 330.0);
+}
 }

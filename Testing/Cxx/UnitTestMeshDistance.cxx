@@ -10,6 +10,8 @@
 #include <cstring>
 #include <random>
 
+namespace UnitTestMeshDistance
+{
 using namespace coronary;
 
 namespace
@@ -544,4 +546,5 @@ TEST(MeshDistance, RefusesBadInput)
   const MeshDistance d = CompareSurfaces(loose, good);
   EXPECT_TRUE(std::isnan(d.pointDistancesA.back()));
   EXPECT_EQ(d.ab.vertices, 18);
+}
 }

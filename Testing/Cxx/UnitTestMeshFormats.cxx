@@ -12,6 +12,8 @@
 #include <limits>
 #include <stdexcept>
 
+namespace UnitTestMeshFormats
+{
 using namespace coronary;
 using namespace formattest;
 
@@ -288,4 +290,5 @@ TEST(Fuzz, DamagedMeshesAndMatricesNeverCrash)
   }
   EXPECT_GT(refused, count / 5);
   EXPECT_LT(refused, count);
+}
 }

@@ -9,6 +9,8 @@
 #include <cmath>
 #include <limits>
 
+namespace UnitTestMeshQuality
+{
 using coronary::Tetrahedron;
 using coronary::Triangle;
 using coronary::Vector3;
@@ -166,4 +168,5 @@ TEST(UnitTestMeshQuality, RefusesWhatIsNoMesh)
   ExpectRefusal([&] { coronary::MeasureTriangles(cube.points, { { 0, 1, 9 } }); }, "element 0");
   cube.points[5].y() = std::numeric_limits<double>::quiet_NaN();
   ExpectRefusal([&] { coronary::MeasureTriangles(cube.points, {}); }, "point 5 is not finite");
+}
 }

@@ -10,6 +10,8 @@
 #include <functional>
 #include <vector>
 
+namespace UnitTestMotionFilling
+{
 using namespace coronary;
 
 namespace
@@ -260,4 +262,5 @@ TEST(MotionFilling, DoesNotBelieveAWholeBranchOfWrongTissue)
   EXPECT_LT(error(true), 0.7);
   slide(0.0);
   EXPECT_LT(error(true), 0.3);
+}
 }

@@ -12,6 +12,8 @@
 #include <limits>
 #include <random>
 
+namespace UnitTestMotionRegularization
+{
 using coronary::MotionEnergies;
 using coronary::MotionEnergy;
 using coronary::MotionRegularizationSettings;
@@ -658,4 +660,5 @@ TEST(MotionRegularization, Refusals)
   refuse("energy", [](auto&, auto&, auto& set) { set.energy = static_cast<MotionEnergy>(2); });
   EXPECT_THROW(
     RegularizeMotion(motion, good, {}, [](double) { return false; }), coronary::Cancelled);
+}
 }

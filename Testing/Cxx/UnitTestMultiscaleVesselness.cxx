@@ -14,6 +14,8 @@
 #include <iostream>
 #include <limits>
 
+namespace UnitTestMultiscaleVesselness
+{
 using namespace coronary;
 
 namespace
@@ -619,4 +621,5 @@ TEST(MultiscaleVesselness, StopsAndRefuses)
     MultiscaleVesselness(Standard(), Vector3(0.4, 0.0, 0.4), volume.extent), std::invalid_argument);
   EXPECT_THROW(VesselnessScales(1.0, 0.5, 3, false), std::invalid_argument);
   EXPECT_EQ(VesselnessScales(0.5, 2.0, 3, true)[1], 1.0);
+}
 }

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <functional>
 
+namespace UnitTestOstialRoot
+{
 using namespace coronary;
 
 namespace
@@ -241,4 +243,5 @@ TEST(OstialRoot, NothingAtOrBehindABranchMoves)
       EXPECT_EQ(tree.radius, before.radius);
     }
   }
+}
 }

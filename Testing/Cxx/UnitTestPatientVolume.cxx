@@ -9,6 +9,8 @@
 #include <limits>
 #include <vector>
 
+namespace UnitTestPatientVolume
+{
 using namespace coronary;
 
 namespace
@@ -222,4 +224,5 @@ TEST(PatientVolume, RefusesWhatIsNoBloodAndMasksOfOtherImages)
   blood.ostia.clear();
   ExpectRefusal([&] { RemoveContrastMedium(volume, blood, {}); }, "ostium");
   EXPECT_THROW(RemoveSurroundings(volume, [](double) { return false; }), Cancelled);
+}
 }

@@ -13,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+namespace UnitTestPhantomDisease
+{
 using namespace coronary;
 
 namespace
@@ -655,4 +657,5 @@ TEST(PhantomDisease, RefusesWhatCanNotBe)
   refusesCollateral({ "D1", "LAD", "RCA", 0.5, 0.5, 0.5, false }, "there is a vessel of that name");
   refusesCollateral({ "C", "LAD", "LAD", 0.5, 0.9, 0.5, false }, "leads from LAD to itself");
   refusesCollateral({ "C", "LAD", "RCA", 0.5, 0.9, 3.0, false }, "diameter_mm from 0.2 to 1.5");
+}
 }

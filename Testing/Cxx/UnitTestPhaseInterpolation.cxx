@@ -11,6 +11,8 @@
 #include <limits>
 #include <random>
 
+namespace UnitTestPhaseInterpolation
+{
 using coronary::InterpolatedPose;
 using coronary::PhaseInterpolation;
 using coronary::PhaseInterpolationMode;
@@ -583,4 +585,5 @@ TEST(PhaseInterpolation, Refusals)
   InterpolatedPose pose;
   ExpectRefusal([&] { motion.Evaluate(nan, pose); }, "time must be finite");
   EXPECT_THROW(PhaseInterpolation(good, {}, [](double) { return false; }), coronary::Cancelled);
+}
 }

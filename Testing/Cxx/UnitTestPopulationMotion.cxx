@@ -14,6 +14,8 @@
 #include <string>
 #include <vector>
 
+namespace UnitTestPopulationMotion
+{
 using namespace coronary;
 
 namespace
@@ -431,4 +433,5 @@ TEST(PopulationMotion, RefusesWhatItCannotUse)
   seen.times = { 0.4 };
   seen.points = { { Vector3::Zero() } };
   ExpectRefused("points", [&] { move(settings, 0.75, { 0.3 }, &seen); });
+}
 }

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+namespace UnitTestProcedure
+{
 using namespace coronary;
 using Goal = ProcedureStep::Goal;
 
@@ -222,4 +224,5 @@ TEST(Procedure, WhatIsNextIsSaid)
   EXPECT_EQ(NextOf({}, {}), "");
   EXPECT_EQ(NextOf(steps, { { 1.0 } }), "Step 2 of 2: do it");
   EXPECT_EQ(NextOf(steps, { { 1.0, 2.0 } }), "All 2 steps are done.");
+}
 }

@@ -28,6 +28,8 @@
 #include <utility>
 #include <vector>
 
+namespace UnitTestProperties
+{
 using namespace coronary;
 
 namespace
@@ -1180,4 +1182,5 @@ TEST(RandomMotion, RegularisationKeepsItsLimitsOrSaysWhereNot)
     }
     EXPECT_LE(beyond, regular.violations) << seed;
   }
+}
 }

@@ -12,6 +12,8 @@
 #include <random>
 #include <string>
 
+namespace UnitTestRealMotion
+{
 using coronary::PhaseInterpolation;
 using coronary::PhaseInterpolationMode;
 using coronary::PhaseInterpolationSettings;
@@ -350,4 +352,5 @@ TEST(RealMotion, LostFramesAndLostPoints)
   EXPECT_LE(beyond, 1e-9);
   EXPECT_LT(lostAfter / lost, 0.7);
   EXPECT_LT(after, 0.5 * before);
+}
 }

@@ -17,6 +17,8 @@
 
 #include <zlib.h>
 
+namespace UnitTestRecording
+{
 using coronary::RecordedItem;
 using coronary::RecordingReader;
 using coronary::RecordingWriter;
@@ -480,4 +482,5 @@ TEST(UnitTestRecording, FilesAppearWhenTheyAreWhole)
   EXPECT_THROW(
     RecordingWriter((folder / "no/such/folder").string(), TestHeader()), std::runtime_error);
   fs::remove_all(folder);
+}
 }

@@ -14,6 +14,8 @@
 #include <fstream>
 #include <unistd.h>
 
+namespace UnitTestScenario
+{
 using coronary::LoadScenario;
 using coronary::Scenario;
 using coronary::ScenarioFromText;
@@ -328,7 +330,7 @@ TEST(UnitTestScenario, PathsAreThoseBesideTheFile)
   text["wire"] = "mine";
   std::ofstream(folder / "s.json") << text.dump();
   EXPECT_THROW(LoadScenario((folder / "s.json").string()), std::runtime_error) << "no catalogue";
-  std::ifstream file(DYNAMICCORONARY_INSTRUMENTS);
+  std::ifstream file(DYNAMICCORONARY_SOURCE_DIR "/Simulator/Session/instruments.json");
   json catalogue = json::parse(file);
   catalogue["wires"][0]["name"] = "mine";
   std::ofstream(folder / "own.json") << catalogue.dump();
@@ -513,4 +515,5 @@ TEST(UnitTestScenario, TheContractionIsAsFastAsItMayBe)
   ExpectRefusal([&] { coronary::ContractionMotion(rest, settings); }, "less than 20 mm");
   settings.radial = 0.9;
   ExpectRefusal([&] { coronary::ContractionMotion(rest, settings); }, "radial is 0.9");
+}
 }

@@ -14,6 +14,8 @@
 #include <map>
 #include <set>
 
+namespace UnitTestSegmentLabeling
+{
 using namespace coronary;
 
 namespace
@@ -659,4 +661,5 @@ TEST(SegmentLabeling, SameResultOnAnyNumberOfThreads)
   EXPECT_EQ(one.segmentId, three.segmentId);
   EXPECT_EQ(first.cost, second.cost);
   EXPECT_EQ(first.heart.axes, second.heart.axes);
+}
 }

@@ -8,6 +8,8 @@
 #include <limits>
 #include <random>
 
+namespace UnitTestSkeletonPose
+{
 using coronary::ApplyPoseEdit;
 using coronary::BoneTransform;
 using coronary::PoseEdit;
@@ -387,4 +389,5 @@ TEST(PoseEdit, RefusesAndStaysAsItWas)
   refuse("calibre", [](PoseEdit& e) { e.calibre = 0.0; });
   refuse("reach", [](PoseEdit& e) { e.reach = -1.0; });
   refuse("Bone 2", [](PoseEdit& e) { e.translation = { 0.0, 0.0, -6.0 }; });
+}
 }

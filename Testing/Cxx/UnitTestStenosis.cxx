@@ -18,6 +18,8 @@
 #include <string>
 #include <vector>
 
+namespace UnitTestStenosis
+{
 using namespace coronary;
 
 namespace
@@ -684,4 +686,5 @@ TEST(PhantomLesions, AreWhatTheTreeShows)
     EXPECT_GT(plaque.value, 500.0);
   }
   EXPECT_TRUE(healthy.Stenoses(0.3).empty());
+}
 }

@@ -15,6 +15,8 @@
 #include <string>
 #include <vector>
 
+namespace UnitTestStent
+{
 using namespace coronary;
 
 namespace
@@ -522,8 +524,8 @@ TEST(Stent, BalloonsAreExchangedEmptyAndInTheGuide)
 // Recorded hands: the stent opened, its balloon exchanged for a second one that opens it further, both withdrawn.
 TEST(Stent, TheRecordedDeploymentRepeatsToTheBit)
 {
-  auto source =
-    std::make_unique<ReplaySource>(std::string(DYNAMICCORONARY_DRIVING) + "/lad-stent.pcirec");
+  auto source = std::make_unique<ReplaySource>(
+    std::string(DYNAMICCORONARY_SOURCE_DIR) + "/Testing/Data/Driving/lad-stent.pcirec");
   const ReplaySource* replay = source.get();
   Scenario scenario = ScenarioFromText(source->Reader().Header().scenario, "The recording", ".");
   ASSERT_TRUE(scenario.balloon && scenario.balloon->stent);
@@ -605,7 +607,9 @@ TEST(Stent, WhatWentWrongIsToldByNameAndPlace)
   scenario.settings.heartRate = 0.0;
   // Quicker, and without angiograms.
   nlohmann::json json = ParseBoundedJson(
-    ReadTextFile(std::string(DYNAMICCORONARY_DRIVING) + "/lad-stent.json", "a script"), "'script'");
+    ReadTextFile(
+      std::string(DYNAMICCORONARY_SOURCE_DIR) + "/Testing/Data/Driving/lad-stent.json", "a script"),
+    "'script'");
   nlohmann::json pieces = nlohmann::json::array();
   bool wired = false;
   for (nlohmann::json& piece : json["pieces"])
@@ -639,4 +643,5 @@ TEST(Stent, WhatWentWrongIsToldByNameAndPlace)
   {
     EXPECT_NE(played.Said.find(words), std::string::npos) << words << "\n" << played.Said;
   }
+}
 }

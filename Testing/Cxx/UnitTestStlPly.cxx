@@ -8,6 +8,8 @@
 #include <cstring>
 #include <stdexcept>
 
+namespace UnitTestStlPly
+{
 using namespace coronary;
 using formattest::TemporaryFolder;
 
@@ -130,4 +132,5 @@ TEST_F(StlPly, DamagedPlyIsRefused)
   this->Refuse("a.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty real x\n", "type");
   this->Refuse("a.ply",
     "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n", "without 'y'");
+}
 }

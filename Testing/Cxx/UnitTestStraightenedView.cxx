@@ -12,6 +12,8 @@
 #include <stdexcept>
 #include <string>
 
+namespace UnitTestStraightenedView
+{
 using namespace coronary;
 
 namespace
@@ -393,4 +395,5 @@ TEST(JoinVessels, BranchesThatLeaveInTheMiddle)
   ASSERT_EQ(chains[0].forks.size(), 2U);
   EXPECT_DOUBLE_EQ(chains[0].forks[0].arc, 5.0);
   EXPECT_DOUBLE_EQ(chains[1].arc.front(), -3.0);
+}
 }

@@ -18,6 +18,8 @@
 #include <stdexcept>
 #include <string>
 
+namespace UnitTestSupernodalFactor
+{
 using namespace coronary;
 
 namespace
@@ -488,4 +490,5 @@ TEST(SupernodalFactor, IsTheSameOnEveryRunAndRefusesWhatIsNotDefinite)
   EXPECT_THROW(factor.Factorize(sparse, 0.0), std::runtime_error);
   dense(20, 20) = -1.0;
   EXPECT_THROW(factor.Factorize(SparseOf(dense), 0.0), std::runtime_error);
+}
 }

@@ -15,6 +15,8 @@
 #include <string>
 #include <vector>
 
+namespace UnitTestSurfaceCleaning
+{
 using namespace coronary;
 
 namespace
@@ -716,4 +718,5 @@ TEST(HoleFilling, LongRimsAreFilledInParts)
       (patch.points[t[1]] - patch.points[t[0]]).cross(patch.points[t[2]] - patch.points[t[0]])[2];
   }
   EXPECT_NEAR(area, M_PI, 1e-4);
+}
 }

@@ -14,6 +14,8 @@
 #include <set>
 #include <string>
 
+namespace UnitTestSweepRescue
+{
 using namespace coronary;
 
 namespace
@@ -387,4 +389,5 @@ TEST(SweepRescue, TrianglesAreReplacedWhereTheyAreBad)
   }
   EXPECT_GT(changed, 0U);
   EXPECT_LT(changed, points.size() / 3);
+}
 }

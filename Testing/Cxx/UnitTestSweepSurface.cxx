@@ -17,6 +17,8 @@
 #include <stdexcept>
 #include <string>
 
+namespace UnitTestSweepSurface
+{
 using namespace coronary;
 
 namespace
@@ -693,4 +695,5 @@ TEST(TriangleIntersections, AHeapIsLeftAfterItsLimit)
   EXPECT_LT(some.size(), all.size());
   EXPECT_TRUE(std::includes(all.begin(), all.end(), some.begin(), some.end()));
   EXPECT_EQ(FindSelfIntersections(points, triangles, all.size() + 1), all);
+}
 }

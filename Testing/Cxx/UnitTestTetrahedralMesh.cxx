@@ -16,6 +16,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+namespace UnitTestTetrahedralMesh
+{
 using coronary::MakeTetrahedralMesh;
 using coronary::SurfaceError;
 using coronary::TetrahedralBackend;
@@ -786,4 +788,5 @@ TEST(TetrahedralMesherMessage, DamagedMessagesAreRefused)
   request.triangles[5] = 4;
   EXPECT_THROW(coronary::DecodeMesherRequest(Encode(request)), std::runtime_error);
   EXPECT_THROW(coronary::DecodeMesherAnswer(bytes), std::runtime_error);
+}
 }

@@ -15,6 +15,8 @@
 #include <stdexcept>
 #include <string>
 
+namespace UnitTestThinBranches
+{
 using namespace coronary;
 
 namespace
@@ -477,4 +479,5 @@ TEST(ThinBranches, ExtractionFollowsThemOutsideOfTheMask)
     nearest = std::min(nearest, (p - BranchEnd).norm());
   }
   EXPECT_LT(nearest, 2.5);
+}
 }

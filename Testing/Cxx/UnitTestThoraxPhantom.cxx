@@ -15,6 +15,8 @@
 #include <string>
 #include <vector>
 
+namespace UnitTestThoraxPhantom
+{
 using namespace coronary;
 
 namespace
@@ -235,4 +237,5 @@ TEST(ThoraxPhantom, canBeCancelledAndRefusesWhatIsNotPossible)
   ExpectRefusal([&] { with([](ThoraxSettings& s) { s.spacing = 0.1; }); }, "spacing");
   ExpectRefusal([&] { with([=](ThoraxSettings& s) { s.width = nan; }); }, "width");
   ExpectRefusal([&] { with([](ThoraxSettings& s) { s.fat = 100.0; }); }, "fat");
+}
 }

@@ -16,6 +16,8 @@
 #include <memory>
 #include <utility>
 
+namespace UnitTestTrainingSession
+{
 using namespace coronary;
 
 namespace
@@ -457,4 +459,5 @@ TEST(Electrocardiogram, HasItsRWaveAtPhaseZeroAndIsPeriodic)
   EXPECT_NEAR(highest, 1.0, 0.15) << "mV";
   EXPECT_GT(ElectrocardiogramAt(0.25), 0.2) << "T";
   EXPECT_GT(ElectrocardiogramAt(-1.0 / 6.0), 0.1) << "P";
+}
 }

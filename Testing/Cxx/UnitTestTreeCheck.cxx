@@ -10,6 +10,8 @@
 #include <set>
 #include <string>
 
+namespace UnitTestTreeCheck
+{
 using namespace coronary;
 
 namespace
@@ -238,4 +240,5 @@ TEST(TreeCheck, OneTreeAloneAndOtherUnits)
   EXPECT_NEAR((1000.0 * metres[0].place - warnings[0].place).norm(), 0.0, 1.0);
 
   EXPECT_TRUE(CheckCoronaryTrees(CenterlineTopology(), LabelingResult()).empty());
+}
 }

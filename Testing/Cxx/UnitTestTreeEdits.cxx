@@ -12,6 +12,8 @@
 #include <functional>
 #include <limits>
 
+namespace UnitTestTreeEdits
+{
 using namespace coronary;
 
 namespace
@@ -552,5 +554,6 @@ TEST(TreeEdits, WhatCanNotBeDoneIsSaidWithThePlace)
   refuseDrawn(Edit(EditKind::AddBranch, { TrunkAt(Fork), SideAt(20.0) }), "OM1", "already");
   refuseDrawn(Edit(EditKind::AddBranch, { TrunkAt(28.0), Vector3(28.0, -8.0, 5.0) }),
     "shows no vessel", "(28.0, -8.0, 5.0)");
+}
 }
 }

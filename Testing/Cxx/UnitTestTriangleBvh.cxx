@@ -11,6 +11,8 @@
 #include <cmath>
 #include <random>
 
+namespace UnitTestTriangleBvh
+{
 using namespace coronary;
 
 namespace
@@ -301,4 +303,5 @@ TEST(TriangleBvh, EmptyAndBadInput)
   ExpectRefusal([&] { TriangleBvh({ { nan, 0, 0 } }, { { 0, 0, 0 } }); }, "not finite");
   // A point that no triangle uses may be anything.
   EXPECT_NO_THROW(TriangleBvh({ { 0, 0, 0 }, { nan, nan, nan } }, { { 0, 0, 0 } }));
+}
 }

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <functional>
 
+namespace UnitTestTurnedBranches
+{
 using namespace coronary;
 
 namespace
@@ -145,4 +147,5 @@ TEST(TurnedBranches, OtherBranchesStay)
     Touch, [](double passed) { return Vector3(passed, 0.0, Touch); }, 12.0);
   EXPECT_TRUE(FindTurnedBranches(image, across, 0.5).empty());
   EXPECT_THROW(FindTurnedBranches(image, down, 0.0), std::invalid_argument);
+}
 }

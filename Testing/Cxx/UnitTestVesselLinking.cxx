@@ -10,6 +10,8 @@
 #include <cmath>
 #include <functional>
 
+namespace UnitTestVesselLinking
+{
 using namespace coronary;
 
 namespace
@@ -475,5 +477,6 @@ TEST(VesselLinking, CenterlinesSayWhatTheyDidNotSee)
       EXPECT_EQ(beside.bridgeConfidence[p], bridge.confidence);
     }
   }
+}
 }
 }

@@ -14,6 +14,8 @@
 #include <random>
 #include <string>
 
+namespace UnitTestVesselSegmentation
+{
 using namespace coronary;
 
 namespace
@@ -714,4 +716,5 @@ TEST(VesselSegmentation, PhantomOverlapsItsTruth)
   }
   EXPECT_GT(truth.size(), 5000u);
   EXPECT_GE(Dice(found, truth), 0.85);
+}
 }

@@ -9,6 +9,8 @@
 #include <limits>
 #include <stdexcept>
 
+namespace UnitTestVesselTree
+{
 using namespace coronary;
 
 namespace
@@ -140,4 +142,5 @@ TEST(VesselTree, ThePhantomsTreeIsOne)
     EXPECT_NEAR(tree.branches[b].length, truth.branches[b].length, 3e-3 * tree.branches[b].length);
   }
   EXPECT_EQ(SplitAtBifurcations(tree).branches.size(), tree.branches.size());
+}
 }

@@ -11,6 +11,8 @@
 #include <limits>
 #include <random>
 
+namespace UnitTestVesselWall
+{
 using namespace coronary;
 
 namespace
@@ -601,4 +603,5 @@ TEST(VesselWall, RefusesWhatIsNoWall)
   next.pop_back();
   ExpectRefusal([&] { wall.BeginFrame(next, 0.1); }, "points, not");
   ExpectRefusal([&] { wall.Place(1, -1); }, "no triangle -1");
+}
 }

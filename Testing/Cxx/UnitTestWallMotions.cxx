@@ -10,6 +10,8 @@
 #include <cmath>
 #include <limits>
 
+namespace UnitTestWallMotions
+{
 using namespace coronary;
 
 namespace
@@ -327,4 +329,5 @@ TEST(WallMotions, RefuseWhatDoesNotFit)
   ExpectRefusal([&] { MakePhantomWallMotion(settings, 0.5); }, "beatIrregularity");
   ExpectRefusal([&] { MakePhantomWallMotion({}, 0.5, 2); }, "phases");
   ExpectRefusal([&] { MakePhantomWallMotion({}, 50.0); }, "surfaceSpacing");
+}
 }

@@ -9,6 +9,8 @@
 #include <cmath>
 #include <vector>
 
+namespace UnitTestWireInGuide
+{
 using namespace coronary;
 
 namespace
@@ -363,5 +365,6 @@ TEST(WireInGuide, AStraightGuideDoesNotRub)
   EXPECT_EQ(wire.AtHand().force, 0.7);
   EXPECT_NEAR(wire.Stiffness(), 60.0 / (1000.0 - 12.0), 1e-12);
   EXPECT_EQ(wire.Angle(), 2.0);
+}
 }
 }

@@ -23,6 +23,8 @@
 #include <string>
 #include <vector>
 
+namespace UnitTestXRayProjectors
+{
 using namespace coronary;
 
 namespace
@@ -1171,4 +1173,5 @@ TEST(VolumeProjector, IsPlastimatchs)
   {
     std::remove((folder + name).c_str());
   }
+}
 }

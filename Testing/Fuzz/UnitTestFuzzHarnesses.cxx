@@ -68,7 +68,8 @@ struct Finding
 std::vector<Finding> Findings()
 {
   std::vector<Finding> found;
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(DYNAMICCORONARY_FINDINGS))
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(
+         DYNAMICCORONARY_SOURCE_DIR "/Testing/Fuzz/Findings"))
   {
     if (entry.is_regular_file())
     {

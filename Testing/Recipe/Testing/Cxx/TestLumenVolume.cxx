@@ -74,5 +74,5 @@ TEST(VtkLumenVolume, EmptyInputAndMissingRadii)
   vtkNew<vtkCoronaryPhantomSource> phantom;
   filter->SetInputConnection(phantom->GetOutputPort(vtkCoronaryPhantomSource::TreePort));
   filter->SetRadiusArrayName("Width");
-  ExpectError(filter, "RadiusArrayName: there is no point array 'Width'");
+  ExpectFilterError(filter, "RadiusArrayName: there is no point array 'Width'");
 }
