@@ -57,6 +57,7 @@ void Ischaemia::Step(double seconds)
     const double time = tip.lacks > tip.injury ? OnsetTime : ReturnTime;
     tip.injury += -std::expm1(-seconds / time) * (tip.lacks - tip.injury);
   }
+  this->Up = this->StShift() >= (this->Up ? Back : Elevated);
 }
 
 double Ischaemia::StShift() const

@@ -25,6 +25,8 @@ class Ischaemia
 {
 public:
   static constexpr double Elevated = 0.1; ///< mV that are told
+  static constexpr double Back =
+    0.08; ///< mV below which they are over: what hovers about a limit is told once
 
   explicit Ischaemia(const CoronaryFlow& flow);
 
@@ -34,6 +36,8 @@ public:
   void Step(double seconds);
 
   double StShift() const; ///< mV, at least 0
+  /// From `Elevated` on, until it is below `Back`.
+  bool IsElevated() const { return this->Up; }
   /// Of the heart that the arteries here supply: how much lacks blood now, 0 to 1.
   double ShareWithout() const;
   /// Branches whose tips lack blood, those with most heart first.
@@ -50,6 +54,7 @@ private:
     double injury = 0.0; ///< 0 to 1
   };
   std::vector<Tip> Tips;
+  bool Up = false;
 };
 }
 

@@ -175,13 +175,13 @@ void TrainingSession::Internals::StepIschaemia(double seconds)
   {
     this->Heart.SetFlow(this->Medium.FlowModel());
   }
+  const bool before = this->Heart.IsElevated();
   this->Heart.Step(seconds);
+  const bool now = this->Heart.IsElevated();
   SessionMetrics& metrics = this->Metrics;
-  const bool before = metrics.stShift >= Ischaemia::Elevated;
   metrics.stShift = this->Heart.StShift();
   metrics.greatestStShift = std::max(metrics.greatestStShift, metrics.stShift);
-  const bool now = metrics.stShift >= Ischaemia::Elevated;
-  metrics.elevatedSeconds += now ? seconds : 0.0;
+  metrics.elevatedSeconds += metrics.stShift >= Ischaemia::Elevated ? seconds : 0.0;
   if (now && !before)
   {
     this->Watch.TellIschaemia(

@@ -133,6 +133,45 @@ TEST(Ischaemia, ComesAndGoesAsSoonAsMeasured)
   EXPECT_NEAR(back, 20.0, 1.0);
 }
 
+TEST(Ischaemia, WhatHoversAboutTheLimitIsToldOnce)
+{
+  const Scene scene;
+  CoronaryFlow flow = scene.Flow();
+  Ischaemia heart(flow);
+  int told = 0;
+  int crossed = 0;
+  const auto step = [&]
+  {
+    const bool up = heart.IsElevated();
+    const bool above = heart.StShift() >= Ischaemia::Elevated;
+    heart.Step(0.1);
+    told += up != heart.IsElevated() ? 1 : 0;
+    crossed += above != (heart.StShift() >= Ischaemia::Elevated) ? 1 : 0;
+  };
+  for (int round = 0; round < 4; ++round)
+  {
+    scene.Fill(flow, 1, 1.5);
+    heart.SetFlow(flow);
+    while (heart.StShift() < 0.11)
+    {
+      step();
+    }
+    scene.Fill(flow, 1, 0.0);
+    heart.SetFlow(flow);
+    while (heart.StShift() > 0.09)
+    {
+      step();
+    }
+  }
+  EXPECT_EQ(crossed, 8);
+  EXPECT_EQ(told, 1);
+  while (heart.StShift() > 0.079)
+  {
+    step();
+  }
+  EXPECT_EQ(told, 2);
+}
+
 // The widest microcirculation makes up for a lesion of 0.75 of its resistance, and for no greater one.
 TEST(Ischaemia, WhatTheMicrocirculationMakesUpFor)
 {
