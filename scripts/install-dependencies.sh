@@ -8,7 +8,7 @@ Usage: scripts/install-dependencies.sh [--check] [--tree paraview|vtk] [--no-tes
   --check      change nothing; name what is missing and exit 1, exit 0 when all is there
   --tree TREE  packages of one tree only (both without this option)
   --no-tests   without the browser and what else only tests use
-  --nightly    Google's benchmark library, and ITK and elastix, which are compared with, as well
+  --nightly    Google's benchmark library, ITK and elastix, which are compared with, and what runs the notebook, as well
   --developer  what --nightly adds, and clang, valgrind, heaptrack, clang-tidy, shellcheck
   --flow       OpenFOAM as well, for scripts/demo-flow.sh and scripts/validate-flow.py
 Runs as root, or through sudo. Run again, it changes nothing.
@@ -72,9 +72,9 @@ common=(
 # ParaView's headers need MPI; Qt: help pages, icons (blank without the SVG plugin), and the simulator's window.
 paraview=(paraview-dev python3-paraview libopenmpi-dev libdouble-conversion-dev "${qt[@]}")
 # For tests; without those after the first two some are skipped: clicks in the window; the review page; a validator of glTF
-# that is fetched; X-ray projections; the notebook.
-tests=(libgtest-dev libxtst6 "${browser[@]}" curl ca-certificates plastimatch python3-nbconvert python3-ipykernel python3-matplotlib)
-nightly=(libbenchmark-dev libinsighttoolkit5-dev elastix)
+# that is fetched; X-ray projections.
+tests=(libgtest-dev libxtst6 "${browser[@]}" curl ca-certificates plastimatch)
+nightly=(libbenchmark-dev libinsighttoolkit5-dev elastix python3-nbconvert python3-ipykernel python3-matplotlib)
 # scripts/fuzz.sh, scripts/lint.sh, scripts/check-leaks.sh.
 developer=("${clang[@]}" valgrind heaptrack shellcheck)
 flow=(openfoam python3-numpy python3-matplotlib)
