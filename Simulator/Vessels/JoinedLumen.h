@@ -29,8 +29,6 @@ public:
   {
   }
 
-  void MoveMouth(const Vector3& mouth) { this->Mouth = mouth; }
-
   void Find(const ContactSample& sample, double reach, SampleContacts& contacts) override;
 
 private:

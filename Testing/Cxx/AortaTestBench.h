@@ -8,6 +8,7 @@
 #include "GuideInAorta.h"
 #include "InstrumentCatalogue.h"
 #include "JoinedLumen.h"
+#include "WallTestMeshes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -118,6 +119,48 @@ struct AortaBench
   JoinedLumen wall;
 };
 
+/// That aorta as a closed surface of triangles.
+inline void AppendAorta(
+  WallTopology& topology, std::vector<Vector3>& points, int around, double spacing)
+{
+  std::vector<Vector3> way = AortaBench::Way();
+  way.front().z() -= 20.0;
+  way.back().z() -= AortaBench::Lumen;
+  double length = 0.0;
+  for (std::size_t i = 1; i < way.size(); ++i)
+  {
+    length += (way[i] - way[i - 1]).norm();
+  }
+  AppendTube(topology, points, 0.0, AortaBench::Lumen, length, around,
+    static_cast<int>(std::ceil(length / spacing)));
+  for (Vector3& point : points)
+  {
+    double along = point.z();
+    std::size_t i = 1;
+    while (i + 1 < way.size() && along > (way[i] - way[i - 1]).norm())
+    {
+      along -= (way[i] - way[i - 1]).norm();
+      ++i;
+    }
+    const Vector3 tangent = (way[i] - way[i - 1]).normalized();
+    point = way[i - 1] + along * tangent + point.x() * Vector3::UnitY() +
+      point.y() * tangent.cross(Vector3::UnitY());
+  }
+}
+
+/// A coronary artery's beginning likewise.
+inline void AppendStump(WallTopology& topology, std::vector<Vector3>& points, const Ostium& ostium)
+{
+  const std::vector<Vector3> line = AortaBench::Stump(ostium);
+  AppendTube(topology, points, 0.0, ostium.radius, (line[1] - line[0]).norm(), 24, 40);
+  const Eigen::Quaterniond turn =
+    Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), ostium.direction);
+  for (Vector3& point : points)
+  {
+    point = line[0] + turn * point;
+  }
+}
+
 /// The wire over which a guide is brought up: 0.035 inch, a steel core of 0.6 mm behind a soft end.
 inline Guidewire LeadingWire()
 {
@@ -140,7 +183,7 @@ inline Guidewire LeadingWire()
 struct GuideDrive
 {
   GuideInAorta guide;
-  AortaBench& bench;
+  AortaBench& bench; ///< of copies, too: it has no memory
   double position = 0.0;
   double angle = 0.0;
   double beyond = 60.0; ///< mm of the leading wire beyond its tip
