@@ -107,6 +107,17 @@ void GuideCatheter::Validate() const
     Require(arc.planeAngle, -2.0 * M_PI, 2.0 * M_PI, part, "the plane's angle", "rad");
     sum += arc.length;
   }
+  RequirePieces(this->sections.size(), 0, whose, "sections");
+  Require(this->wallFriction, 0.0, 2.0, whose, "the wall's friction", "");
+  for (std::size_t n = 0; n < this->sections.size(); ++n)
+  {
+    const CatheterSection& section = this->sections[n];
+    const std::string part = whose + ", section " + std::to_string(n + 1);
+    Require(section.length, 0.1, 3000.0, part, "the length", "mm");
+    // From a tenth of the softest tip's to ten times the stiffest 8 French shaft's.
+    Require(section.bendingStiffness, 0.1, 2e4, part, "the bending stiffness", "N mm^2");
+    Require(section.torsionalStiffness, 0.1, 5e4, part, "the torsional stiffness", "N mm^2");
+  }
   if (sum > this->length)
   {
     char text[120];
@@ -114,6 +125,37 @@ void GuideCatheter::Validate() const
       ": its arcs are %g mm long together, more than its length of %g mm.", sum, this->length);
     throw std::invalid_argument(whose + text);
   }
+}
+
+Eigen::Vector2d CurvatureAt(const std::vector<CatheterArc>& shape, double behind)
+{
+  for (const CatheterArc& arc : shape)
+  {
+    if (behind < arc.length)
+    {
+      return arc.curvature * Eigen::Vector2d(std::cos(arc.planeAngle), std::sin(arc.planeAngle));
+    }
+    behind -= arc.length;
+  }
+  return Eigen::Vector2d::Zero();
+}
+
+Eigen::Vector2d TurnBetween(const std::vector<CatheterArc>& shape, double from, double to)
+{
+  Eigen::Vector2d turn = Eigen::Vector2d::Zero();
+  double begin = 0.0;
+  for (const CatheterArc& arc : shape)
+  {
+    const double end = begin + arc.length;
+    const double within = std::min(to, end) - std::max(from, begin);
+    if (within > 0.0)
+    {
+      turn += within * arc.curvature *
+        Eigen::Vector2d(std::cos(arc.planeAngle), std::sin(arc.planeAngle));
+    }
+    begin = end;
+  }
+  return turn;
 }
 
 namespace

@@ -5,6 +5,7 @@
 #ifndef DynamicCoronary_Instrument_h
 #define DynamicCoronary_Instrument_h
 
+#include "Geometry.h"
 #include "StentRing.h"
 
 #include <cstddef>
@@ -40,17 +41,17 @@ struct Guidewire
   void Validate() const;
 };
 
-/// A property of a wire at a distance from its tip, mm: linear from the middle of one section to that of the next.
-/// @param property  of a WireSection
-template <typename Property>
-double AlongWire(const Guidewire& wire, double distance, Property property)
+/// A property of what has sections at a distance from its tip, mm: linear from the middle of one to that of the next.
+/// @param property  of a section
+template <typename Section, typename Property>
+double AlongSections(const std::vector<Section>& sections, double distance, Property property)
 {
   double from = 0.0;
   double lastMiddle = 0.0;
   double lastValue = 0.0;
-  for (std::size_t i = 0; i < wire.sections.size(); ++i)
+  for (std::size_t i = 0; i < sections.size(); ++i)
   {
-    const WireSection& section = wire.sections[i];
+    const Section& section = sections[i];
     const double middle = from + 0.5 * section.length;
     const double value = property(section);
     if (distance < middle)
@@ -69,6 +70,12 @@ double AlongWire(const Guidewire& wire, double distance, Property property)
   return lastValue;
 }
 
+template <typename Property>
+double AlongWire(const Guidewire& wire, double distance, Property property)
+{
+  return AlongSections(wire.sections, distance, property);
+}
+
 /// Curvature at rest at a distance from the tip, 1/mm: that of the section, all along it; 0 behind the last one.
 double RestCurvature(const Guidewire& wire, double distance);
 
@@ -81,6 +88,14 @@ struct CatheterArc
     0.0; ///< radians by which the plane of curvature is turned against the first one
 };
 
+/// A piece of a guide catheter's tube, counted from its tip.
+struct CatheterSection
+{
+  double length = 0.0;             ///< mm, positive
+  double bendingStiffness = 0.0;   ///< EI, N mm^2, positive
+  double torsionalStiffness = 0.0; ///< GJ, N mm^2, positive
+};
+
 /// A guide catheter. Proximal of its last arc it is straight.
 struct GuideCatheter
 {
@@ -90,11 +105,19 @@ struct GuideCatheter
   double outerRadius = 0.0;       ///< mm, greater than innerRadius
   double length = 1000.0;         ///< mm
   double friction = 0.0;          ///< coefficient of a wire against its inside, 0 to 2
+  double wallFriction = 0.0;      ///< coefficient of its outside against a vessel's wall, 0 to 2
   std::vector<CatheterArc> shape; ///< from the tip
+  /// From the tip, linear as a wire's; the last one goes on to the end. Empty: not known, it can only be rigid.
+  std::vector<CatheterSection> sections;
 
   /// @throws std::invalid_argument naming the catheter and the property
   void Validate() const;
 };
+
+/// Curvature at rest at a distance behind the tip, 1/mm, in a frame that does not turn about the catheter.
+Eigen::Vector2d CurvatureAt(const std::vector<CatheterArc>& shape, double behind);
+/// By which the catheter turns at rest between two places behind its tip, rad: the integral of its curvature.
+Eigen::Vector2d TurnBetween(const std::vector<CatheterArc>& shape, double from, double to);
 
 /// Of a balloon in air.
 struct ComplianceRow

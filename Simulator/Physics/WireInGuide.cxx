@@ -21,20 +21,6 @@ constexpr int Iterations = 4;     // from where it lay before
 constexpr int Passes = 3;         // for what slides and what sticks
 constexpr double ShaftStep = 5.0; // mm
 
-/// The guide's curvature behind its tip, in a frame that does not turn about it.
-Eigen::Vector2d CurvatureAt(const GuideCatheter& guide, double behind)
-{
-  for (const CatheterArc& arc : guide.shape)
-  {
-    if (behind < arc.length)
-    {
-      return arc.curvature * Eigen::Vector2d(std::cos(arc.planeAngle), std::sin(arc.planeAngle));
-    }
-    behind -= arc.length;
-  }
-  return Eigen::Vector2d::Zero();
-}
-
 /// Mean over a piece, so that no place of a bend falls between two nodes.
 Eigen::Vector2d MeanCurvature(const GuideCatheter& guide, double from, double to)
 {
@@ -42,7 +28,7 @@ Eigen::Vector2d MeanCurvature(const GuideCatheter& guide, double from, double to
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   for (int i = 0; i < Parts; ++i)
   {
-    sum += CurvatureAt(guide, from + (i + 0.5) / Parts * (to - from));
+    sum += CurvatureAt(guide.shape, from + (i + 0.5) / Parts * (to - from));
   }
   return sum / Parts;
 }
@@ -86,7 +72,7 @@ WireInGuide::WireInGuide(const Guidewire& wire, const GuideCatheter& guide, doub
     for (int part = 0; part < parts; ++part)
     {
       const double behind = from + (static_cast<double>(i) + (part + 0.5) / parts) * this->Length;
-      this->Cells[i].turn += CurvatureAt(guide, behind).norm() * this->Length / parts;
+      this->Cells[i].turn += CurvatureAt(guide.shape, behind).norm() * this->Length / parts;
     }
   }
   this->Curved = std::any_of(wire.sections.begin(), wire.sections.end(),

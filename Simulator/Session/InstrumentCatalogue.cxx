@@ -257,6 +257,23 @@ CatalogueCatheter CatheterFromJson(const Json& object, const std::string& where)
     piece.Done();
     catheter.shape.push_back(arc);
   }
+  if (fields.Has("sections"))
+  {
+    catheter.wallFriction = fields.Number("wall_friction", 0.0, Any);
+    for (const Json& entry : fields.List("sections"))
+    {
+      JsonFields piece(
+        entry, fields.Where() + ", section " + std::to_string(catheter.sections.size() + 1));
+      CatheterSection section;
+      section.length = piece.Number("length_mm", 0.0, Any);
+      section.bendingStiffness = piece.Number("bending_stiffness_N_mm2", 0.0, Any);
+      section.torsionalStiffness = piece.Number("torsional_stiffness_N_mm2", 0.0, Any);
+      piece.Text("name", "");
+      result.moduli.push_back(piece.Number("modulus_MPa", 0.0, 1e6, 0.0));
+      piece.Done();
+      catheter.sections.push_back(section);
+    }
+  }
   result.sources = SourcesOf(fields);
   fields.Done();
   Check(catheter, where);
@@ -337,10 +354,21 @@ Json CatheterToJson(const GuideCatheter& catheter)
     shape.push_back({ { "length_mm", arc.length }, { "curvature_per_mm", arc.curvature },
       { "plane_rad", arc.planeAngle } });
   }
-  return { { "name", catheter.name }, { "source", catheter.source },
+  Json json = { { "name", catheter.name }, { "source", catheter.source },
     { "inner_diameter_mm", 2.0 * catheter.innerRadius },
     { "outer_diameter_mm", 2.0 * catheter.outerRadius }, { "length_mm", catheter.length },
     { "friction", catheter.friction }, { "shape", shape } };
+  if (!catheter.sections.empty())
+  {
+    json["wall_friction"] = catheter.wallFriction;
+    for (const CatheterSection& section : catheter.sections)
+    {
+      json["sections"].push_back(
+        { { "length_mm", section.length }, { "bending_stiffness_N_mm2", section.bendingStiffness },
+          { "torsional_stiffness_N_mm2", section.torsionalStiffness } });
+    }
+  }
+  return json;
 }
 
 const CatalogueWire& InstrumentCatalogue::Wire(const std::string& name) const

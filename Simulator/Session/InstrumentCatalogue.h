@@ -40,6 +40,8 @@ struct CatalogueCatheter
 {
   GuideCatheter catheter;
   std::string description;
+  std::vector<double>
+    moduli; ///< MPa, a section each, that stiffness was computed from; 0: not known
   ValueSources sources;
 };
 

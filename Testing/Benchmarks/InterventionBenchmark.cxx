@@ -1,10 +1,12 @@
 // A tick of the simulator: a wire of about a hundred segments in the standard phantom's beating left coronary
-// artery, and the rod alone. Time is the processor's.
+// artery, and the rod alone; a guide catheter in an aorta. Time is the processor's.
+#include "AortaTestBench.h"
 #include "BenchmarkLimits.h"
 #include "CosseratRod.h"
 #include "InstrumentCatalogue.h"
 #include "Intervention.h"
 #include "Scenario.h"
+#include "VesselWall.h"
 #include "WallMotions.h"
 
 #include <benchmark/benchmark.h>
@@ -74,6 +76,64 @@ void RodAlone(benchmark::State& state)
   }
 }
 BENCHMARK(RodAlone)->Arg(60)->Arg(100)->Arg(200)->Unit(benchmark::kMicrosecond);
+}
+
+namespace
+{
+// A guide in an aorta of triangles, from the diaphragm into the left ostium, pushed to and fro by a millimetre.
+void Guide(benchmark::State& state)
+{
+  AortaBench bench;
+  WallTopology aorta;
+  std::vector<Vector3> aortaPoints;
+  AppendAorta(aorta, aortaPoints, 64, 1.5);
+  WallTopology stump;
+  std::vector<Vector3> stumpPoints;
+  AppendStump(stump, stumpPoints, bench.ostium);
+  VesselWallSettings settings;
+  settings.surfaceReach = 60.0;
+  settings.stiffness = 60.0;
+  VesselWall aortaWall(aorta, aortaPoints, settings);
+  VesselWall stumpWall(stump, stumpPoints, settings);
+  JoinedLumen wall(aortaWall, stumpWall, bench.ostium.position, 40.0);
+  GuideInAorta guide(BuiltInCatalogue().Catheter("JL4-6F").catheter, AortaBench::Way());
+  const Guidewire wire = LeadingWire();
+  double position = 0.0;
+  double beyond = 60.0;
+  const auto move = [&](double push, double draw, int ticks)
+  {
+    for (int k = 0; k < ticks; ++k)
+    {
+      position += push / ticks;
+      beyond -= draw / ticks;
+      guide.Carry(wire, beyond);
+      guide.Step(position, 0.0, wall);
+    }
+  };
+  move(315.0, 0.0, 8000);
+  move(0.0, 260.0, 6000);
+  for (int k = 0; k < 100 && !SeatOf(guide.Tip(), guide.Direction(), bench.ostium).engaged; ++k)
+  {
+    move(1.0, 0.0, 200);
+  }
+  if (!SeatOf(guide.Tip(), guide.Direction(), bench.ostium).engaged)
+  {
+    state.SkipWithError("the guide does not engage");
+    return;
+  }
+  long k = 0;
+  for (auto _ : state)
+  {
+    position += (k / 200) % 2 == 0 ? -0.005 : 0.005;
+    guide.Carry(wire, beyond);
+    benchmark::DoNotOptimize(guide.Step(position, 0.0, wall).touching);
+    ++k;
+  }
+  state.counters["segments"] = static_cast<double>(guide.Rod().Size());
+  state.counters["triangles"] =
+    static_cast<double>(aorta.triangles.size() + stump.triangles.size());
+}
+BENCHMARK(Guide)->MinTime(2.0)->Unit(benchmark::kMicrosecond);
 }
 
 /// --strict: half of a core at 2 kHz.

@@ -81,6 +81,34 @@ TEST(UnitTestInstrumentCatalogue, StiffnessFollowsFromGeometryAndModulus)
   }
 }
 
+TEST(UnitTestInstrumentCatalogue, GuidesAreTubesOfTheirModulus)
+{
+  for (const auto& one : BuiltInCatalogue().catheters)
+  {
+    const coronary::GuideCatheter& guide = one.catheter;
+    ASSERT_EQ(one.moduli.size(), guide.sections.size());
+    ASSERT_GE(guide.sections.size(), 2U) << guide.name;
+    const double area =
+      M_PI / 4.0 * (std::pow(guide.outerRadius, 4) - std::pow(guide.innerRadius, 4));
+    for (std::size_t n = 0; n < one.moduli.size(); ++n)
+    {
+      EXPECT_NEAR(guide.sections[n].bendingStiffness / (one.moduli[n] * area), 1.0, 0.005)
+        << guide.name << " section " << n + 1;
+    }
+  }
+  // Thicker is stiffer, of every shape: 5F < 6F < 7F < 8F.
+  for (const char* shape : { "JL4", "JR4", "EBU3.5", "AL1" })
+  {
+    double before = 0.0;
+    for (const char* size : { "-5F", "-6F", "-7F", "-8F" })
+    {
+      const auto& guide = BuiltInCatalogue().Catheter(std::string(shape) + size).catheter;
+      EXPECT_GT(guide.sections.back().bendingStiffness, 1.5 * before) << guide.name;
+      before = guide.sections.back().bendingStiffness;
+    }
+  }
+}
+
 TEST(UnitTestInstrumentCatalogue, SteelOfAWholeWire)
 {
   // Solid steel of 0.014 inch: I = 7.88e-16 m^4 times 200 GPa.
@@ -134,8 +162,8 @@ TEST(UnitTestInstrumentCatalogue, EveryValueHasASource)
   for (const json& catheter : all["catheters"])
   {
     const auto& read = BuiltInCatalogue().Catheter(catheter["name"]);
-    for (const char* key :
-      { "inner_diameter_mm", "outer_diameter_mm", "length_mm", "friction", "shape" })
+    for (const char* key : { "inner_diameter_mm", "outer_diameter_mm", "length_mm", "friction",
+           "wall_friction", "bending_stiffness_N_mm2", "torsional_stiffness_N_mm2", "shape" })
     {
       EXPECT_GT(read.sources.count(key), 0U) << catheter["name"] << " " << key;
     }
@@ -179,6 +207,15 @@ TEST(UnitTestInstrumentCatalogue, RefusesWithThePlace)
     [&](json& all) { all["catheters"][0]["inner_diameter_mm"] = 3; }, "not greater than the inner");
   Refused([&](json& all) { all["catheters"][0]["length_mm"] = 100; }, "arcs are 156 mm long");
   Refused([&](json& all) { all["catheters"][0]["shape"][1]["turn_deg"] = 10000; }, "'turn_deg'");
+  const auto tube = [](json& all) -> json& { return all["catheters"][0]["sections"][1]; };
+  Refused([&](json& all) { tube(all)["bending_stiffness_N_mm2"] = -1; },
+    "catheter 'JL4-4F', section 2 has a negative 'bending_stiffness_N_mm2': -1");
+  Refused([&](json& all) { tube(all)["torsional_stiffness_N_mm2"] = 0; },
+    "section 2: the torsional stiffness is 0 N mm^2");
+  Refused([&](json& all) { tube(all).erase("length_mm"); }, "has no 'length_mm'");
+  Refused([&](json& all) { tube(all)["stiffness"] = 1; }, "'stiffness', which means nothing");
+  Refused([&](json& all) { all["catheters"][0].erase("wall_friction"); }, "has no 'wall_friction'");
+  Refused([&](json& all) { all["catheters"][0]["wall_friction"] = 3; }, "the wall's friction is 3");
   Refused([&](json& all) { all["version"] = 2; }, "another 'version'");
   Refused([&](json& all) { all["format"] = "x"; }, "no catalogue");
   EXPECT_THROW(CatalogueFromText("{", "'own.json'"), std::runtime_error);

@@ -119,6 +119,15 @@ TEST(UnitTestScenario, TextSaysEverythingToTheBit)
     {
       EXPECT_EQ(again.catheter.shape[n].curvature, scenario.catheter.shape[n].curvature);
     }
+    EXPECT_EQ(again.catheter.wallFriction, scenario.catheter.wallFriction);
+    ASSERT_EQ(again.catheter.sections.size(), scenario.catheter.sections.size());
+    for (std::size_t n = 0; n < scenario.catheter.sections.size(); ++n)
+    {
+      EXPECT_EQ(again.catheter.sections[n].bendingStiffness,
+        scenario.catheter.sections[n].bendingStiffness);
+      EXPECT_EQ(again.catheter.sections[n].torsionalStiffness,
+        scenario.catheter.sections[n].torsionalStiffness);
+    }
     EXPECT_EQ(again.vessels.contraction.twist, scenario.vessels.contraction.twist);
     EXPECT_EQ(again.balloon.has_value(), scenario.balloon.has_value());
     EXPECT_EQ(again.exchanges.size(), scenario.exchanges.size());
