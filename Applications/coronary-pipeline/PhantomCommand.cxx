@@ -13,6 +13,7 @@
 #include "ScannerOptions.h"
 #include "SeriesDescription.h"
 #include "StagedFolder.h"
+#include "vtkAortaData.h"
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 
@@ -287,8 +288,8 @@ public:
       }
       if (IsDiseased(this->Job.settings))
       {
-        const CoronaryPhantom phantom(this->Job.settings);
-        WriteFileAtomically(folder.Add(DiseaseName), DescribeDisease(phantom, this->Times));
+        WriteFileAtomically(
+          folder.Add(DiseaseName), DescribeDisease(this->TruePhantom(), this->Times));
       }
     }
     if (this->Scanner)
@@ -330,16 +331,36 @@ public:
   }
 
 private:
-  /// A scanner with the heart in it, before anything is computed: a wrong setting is told at once.
-  void MakeScanner()
+  /// Where the images are to be, before there is one.
+  void FindGrid()
   {
     this->Source->UpdateInformation();
     vtkInformation* image = this->Source->GetOutputInformation(vtkCoronaryPhantomSource::ImagePort);
     image->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), this->Grid.extent.data());
     image->Get(vtkDataObject::ORIGIN(), this->Grid.origin.data());
     image->Get(vtkDataObject::SPACING(), this->Grid.spacing.data());
-    this->Phantom = std::make_unique<CoronaryPhantom>(this->Job.settings);
-    this->Anatomy = std::make_unique<ScannedPhantom>(*this->Phantom);
+    if (image->Has(vtkDataObject::DIRECTION()))
+    {
+      using Rows = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+      this->Grid.direction = Eigen::Map<const Rows>(image->Get(vtkDataObject::DIRECTION()));
+    }
+  }
+
+  /// The phantom itself, made when it is needed first.
+  const CoronaryPhantom& TruePhantom()
+  {
+    if (!this->Phantom)
+    {
+      this->Phantom = std::make_unique<CoronaryPhantom>(this->Job.settings);
+    }
+    return *this->Phantom;
+  }
+
+  /// A scanner with the heart in it, before anything is computed: a wrong setting is told at once.
+  void MakeScanner()
+  {
+    this->FindGrid();
+    this->Anatomy = std::make_unique<ScannedPhantom>(this->TruePhantom());
     this->Scanner = std::make_unique<ImageScan>(
       *this->Anatomy, this->Job.scan, this->Grid, this->Times, this->Job.variants);
   }
@@ -399,8 +420,40 @@ private:
     {
       write(vtkCoronaryPhantomSource::WallPort, "wall");
     }
+    this->WriteAorta(folder, index, phase.fraction);
     phase.centerline = write(vtkCoronaryPhantomSource::TreePort, "centerline");
     phase.surface = write(vtkCoronaryPhantomSource::SurfacePort, "surface");
+  }
+
+  /// What the image holds of the aorta, completed as `run` completes it.
+  void WriteAorta(StagedFolder& folder, std::size_t index, double time)
+  {
+    this->FindGrid();
+    std::vector<AorticRing> rings = this->TruePhantom().Aorta(time);
+    const Vector3 low(this->Grid.extent[0], this->Grid.extent[2], this->Grid.extent[4]);
+    const Vector3 high(this->Grid.extent[1], this->Grid.extent[3], this->Grid.extent[5]);
+    const auto outside = [&](const Vector3& p)
+    {
+      const Vector3 voxel = (this->Grid.direction.transpose() * (p - this->Grid.origin))
+                              .cwiseQuotient(this->Grid.spacing);
+      return (voxel - low).minCoeff() < 0.0 || (high - voxel).minCoeff() < 0.0;
+    };
+    rings.erase(std::find_if(rings.begin(), rings.end(),
+                  [&](const AorticRing& ring)
+                  { return std::any_of(ring.rim.begin(), ring.rim.end(), outside); }),
+      rings.end());
+    constexpr std::size_t least = 3;
+    if (rings.size() < least)
+    {
+      return;
+    }
+    const AorticModel aorta = ModelAorta(rings);
+    const std::string words = DescribeAorta(aorta, "the image's border");
+    const std::string number = this->Numbers[index] + ".vtp";
+    WritePolyData(
+      folder.Add("truth/aorta_wall_" + number), AorticSurface(aorta, words), this->Messages);
+    WritePolyData(folder.Add("truth/aorta_centerline_" + number), AorticCenterline(aorta, words),
+      this->Messages);
   }
 
   void WriteImage(StagedFolder& folder, std::size_t index, SeriesDescription::Phase& phase)
@@ -433,7 +486,7 @@ private:
   vtkMessageTrap Messages;
   SeriesDescription Series;
   ImageGrid Grid;
-  std::unique_ptr<CoronaryPhantom> Phantom; ///< that the scanner sees
+  std::unique_ptr<CoronaryPhantom> Phantom; ///< see TruePhantom()
   std::unique_ptr<ScannedAnatomy> Anatomy;
   std::unique_ptr<ImageScan> Scanner; ///< none: images by a formula
   double ReferenceTime = 0.0;
@@ -486,8 +539,9 @@ Command MakePhantomCommand(CLI::App& program)
   CLI::App* app = program.add_subcommand(
     "phantom", "Make a gated CT series of a beating coronary tree, with its exact truth");
   app->footer(
-    "Writes DIR/phase_NN.mha, DIR/truth/surface_NN.vtp, centerline_NN.vtp, vein_NN.vtp "
-    "and, last, DIR/series.json, with NN from 00; with disease DIR/truth/disease.json and "
+    "Writes DIR/phase_NN.mha, DIR/truth/surface_NN.vtp, centerline_NN.vtp, vein_NN.vtp, "
+    "aorta_wall_NN.vtp, aorta_centerline_NN.vtp and, last, DIR/series.json, with NN from 00; with "
+    "disease DIR/truth/disease.json and "
     "wall_NN.vtp; with --scanner DIR/scan.json: what is in DIR/scan-parts until all is written "
     "lets "
     "a scan that was stopped go on.");

@@ -78,12 +78,12 @@ Command MakeRunCommand(CLI::App& program)
 {
   CLI::App* app = program.add_subcommand(
     "run", "From a gated image series, or a surface, to the beating coronary arteries");
-  app->footer(
-    "Writes DIR/vesselness.mha, mask.mha, ostia.vtp, aorta.vtp, bridges.vtp, centerline.vtp, "
-    "bifurcations.vtp, centerline_lines.vtp, status.csv, surface.vtp, caps.vtp, "
-    "skeleton.vtp, skeleton.tgf, volume.vtu, volume_boundary.vtp, volume_skeleton.vtp, "
-    "weights.vtu, weights.dmat, motion.pvd, motion/ with series of centerlines, "
-    "skeletons, tetrahedra and surfaces; and, after every stage, report.json.");
+  app->footer("Writes DIR/vesselness.mha, mask.mha, ostia.vtp, aorta.vtp, bridges.vtp, "
+              "aorta_wall.vtp, aorta_centerline.vtp, centerline.vtp, bifurcations.vtp, "
+              "centerline_lines.vtp, status.csv, surface.vtp, caps.vtp, "
+              "skeleton.vtp, skeleton.tgf, volume.vtu, volume_boundary.vtp, volume_skeleton.vtp, "
+              "weights.vtu, weights.dmat, motion.pvd, motion/ with series of centerlines, "
+              "skeletons, tetrahedra and surfaces; and, after every stage, report.json.");
   auto job = std::make_shared<RunCommand>(*app);
   return { app, [job] { job->Run(); }, true };
 }

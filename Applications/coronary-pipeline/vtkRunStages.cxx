@@ -18,6 +18,7 @@
 #include "vtkDataFiles.h"
 #include "vtkMessageTrap.h"
 #include "vtkMovingMesh.h"
+#include "vtkRunAorta.h"
 #include "vtkRunEdits.h"
 #include "vtkRunLesions.h"
 #include "vtkRunMask.h"
@@ -468,6 +469,10 @@ Json MakeSegmentation(RunStep& step)
   }
   else
   {
+    if (given.empty())
+    {
+      NeedOstia(step);
+    }
     Segment(step, mask, seeds, aorta, bridges);
     numbers["window"] = Numbers(mask, vtkCoronaryArrayNames::BloodWindow);
   }
@@ -500,6 +505,7 @@ Json MakeSegmentation(RunStep& step)
   numbers["seeds_file"] = "ostia.vtp";
   numbers["aorta_file"] = "aorta.vtp";
   numbers["bridges_file"] = "bridges.vtp";
+  numbers["aorta"] = MakeAorta(step);
   return numbers;
 }
 
@@ -1055,7 +1061,8 @@ std::vector<std::string> UsualFiles(const std::string& folder, RunStage from)
 {
   const std::vector<std::vector<std::string>> byStage = {
     { "vesselness.mha" },
-    { "mask.mha", "ostia.vtp", "aorta.vtp", "bridges.vtp" },
+    { "mask.mha", "ostia.vtp", "aorta.vtp", "bridges.vtp", "aorta_wall.vtp",
+      "aorta_centerline.vtp" },
     { "given_surface.vtp", "centerline.vtp", "bifurcations.vtp", "centerline_lines.vtp",
       "status.csv", "lesions.csv", "calcium.mha", "edited_mask.mha" },
     { "surface.vtp", "caps.vtp" },

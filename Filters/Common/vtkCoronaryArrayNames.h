@@ -35,6 +35,12 @@ constexpr const char* BridgePoints = "BridgePoints"; ///< double[4], mm and numb
 constexpr const char* BridgeConfidences = "BridgeConfidences"; ///< double, 0 to 1, one a bridge
 constexpr const char* BridgeUnseen = "BridgeUnseen"; ///< double, mm without a tube, one a bridge
 
+// Aorta, point data.
+constexpr const char* Measured = "Measured"; ///< uchar, 1: seen in the image, 0: completed
+// Aorta, field data.
+constexpr const char* AortaSource = "AortaSource";   ///< string, what was seen, what completed
+constexpr const char* AortaLengths = "AortaLengths"; ///< double[4], mm: see vtkAortaData.h
+
 // Centerline tree, field data: what touched it and was left out.
 constexpr const char* VeinPositions = "VeinPositions";         ///< double[3], mm
 constexpr const char* VeinLengths = "VeinLengths";             ///< double, mm

@@ -2,6 +2,7 @@
 
 #include "CounterRandom.h"
 #include "Median.h"
+#include "Numbers.h"
 #include "PartialProgress.h"
 #include "PhantomAnatomy.h"
 #include "PhantomComposition.h"
@@ -332,6 +333,32 @@ PhantomTree CoronaryPhantom::Tree(double t) const
     }
   }
   return tree;
+}
+
+std::vector<AorticRing> CoronaryPhantom::Aorta(double t) const
+{
+  constexpr double spacing = 1.0; // mm
+  constexpr int around = 64;
+  const AorticRoot& root = this->Data->Anatomy.root;
+  const Vector3 shift = this->Data->Motion.BeatShift(t);
+  const Vector3 u = root.axis.unitOrthogonal();
+  const Vector3 v = root.axis.cross(u);
+  std::vector<AorticRing> rings;
+  for (double height = -AorticRoot::Valve; height <= AorticRoot::Above; height += spacing)
+  {
+    const Vector3 centre = root.centre + height * root.axis;
+    AorticRing ring;
+    ring.centre = this->Data->Motion.Position(centre, t, shift);
+    for (int n = 0; n < around; ++n)
+    {
+      const double angle = 2.0 * Pi * n / around;
+      const Vector3 rest =
+        centre + root.RadiusAt(height) * (std::cos(angle) * u + std::sin(angle) * v);
+      ring.rim.push_back(this->Data->Motion.Position(rest, t, shift));
+    }
+    rings.push_back(std::move(ring));
+  }
+  return rings;
 }
 
 std::vector<PhantomStenosis> CoronaryPhantom::Stenoses(double t) const

@@ -14,6 +14,7 @@
 #ifndef DynamicCoronary_CoronaryPhantom_h
 #define DynamicCoronary_CoronaryPhantom_h
 
+#include "AorticModel.h"
 #include "CoronaryAnatomy.h"
 #include "Geometry.h"
 #include "ParallelFor.h"
@@ -258,6 +259,10 @@ public:
   std::vector<PhantomCollateralTruth> Collaterals(double t) const;
 
   std::vector<PhantomOstium> Ostia(double t) const;
+
+  /// The aorta's wall without the mouths of the arteries: sections 1 mm apart at rest, from 14 mm below the ostia to 160 mm
+  /// above, far beyond any image.
+  std::vector<AorticRing> Aorta(double t) const;
 
   ///@{
   /// Narrowings of all kinds, and balls of calcium.

@@ -317,7 +317,7 @@ void AnatomyBuilder::RaiseRightOstium()
   DenseVessel& right = this->Dense[this->ByName.at("RCA")];
   const Vector3 outwards = (right.points.front() - root.centre).normalized();
   // The aorta tapers above its sinuses, as the tissues have it.
-  const double radius = root.radius * (1.0 - 0.15 * (rise - 8.0) / 30.0);
+  const double radius = root.RadiusAt(rise);
   const Vector3 place = root.centre + rise * root.axis + radius * outwards;
   const Vector3 shift = place - right.points.front();
   double reach = along;

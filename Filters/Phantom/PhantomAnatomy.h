@@ -7,6 +7,9 @@
 
 #include "PhantomParts.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace coronary
 {
 /// A calcification on a vessel's wall.
@@ -47,14 +50,27 @@ struct AxisStep
   bool inMuscle; ///< no fat around it
 };
 
-/// The aorta where the coronary arteries leave it: a capsule along the axis.
+/// The aorta where the coronary arteries leave it: a capsule along the axis, narrower above the sinuses.
 struct AorticRoot
 {
-  static constexpr double Below = 7.0;   ///< mm from the centre to the capsule's lower focus
-  static constexpr double Above = 160.0; ///< the same for the upper one: beyond any image
-  Vector3 centre;                        ///< mm
-  Vector3 axis;                          ///< unit vector out of the heart
-  double radius;                         ///< mm
+  static constexpr double Valve = 14.0;   ///< mm from the centre down to the valve
+  static constexpr double Below = 7.0;    ///< mm from the centre to the capsule's lower focus
+  static constexpr double Sinuses = 8.0;  ///< mm from the centre to where it begins to taper
+  static constexpr double Tubular = 38.0; ///< the same to where it is done
+  static constexpr double Taper = 0.85;   ///< of the radius, from there on
+  static constexpr double Above =
+    160.0;        ///< mm from the centre to the upper focus: beyond any image
+  Vector3 centre; ///< mm
+  Vector3 axis;   ///< unit vector out of the heart
+  double radius;  ///< mm, of the sinuses
+
+  /// The wall's distance from the axis, mm, `height` mm along the axis from the centre, from -Valve to Above.
+  double RadiusAt(double height) const
+  {
+    const double below = std::min(0.0, height + Below);
+    const double part = std::clamp((height - Sinuses) / (Tubular - Sinuses), 0.0, 1.0);
+    return std::sqrt(this->radius * this->radius - below * below) * (1.0 - part * (1.0 - Taper));
+  }
 };
 
 /// A collateral vessel where it is.

@@ -65,18 +65,19 @@ Tissues::Tissues(const PhantomSettings& settings, const PhantomAnatomy& anatomy)
   const Vector3& root = anatomy.root.centre;
   const Vector3& up = anatomy.root.axis;
   const double bore = anatomy.root.radius;
-  const double upper = 0.85 * bore;
+  const double upper = AorticRoot::Taper * bore;
+  const Vector3 sinuses = root + AorticRoot::Sinuses * up;
+  const Vector3 tubularEnd = root + AorticRoot::Tubular * up;
+  const Vector3 top = root + AorticRoot::Above * up;
   const Vector3 valve = anatomy.frame.ToWorld(Vector3(12.0, 8.0, 16.0));
   const int outflow = capsule(valve, root - 6.0 * s * up, 10.0 * s, 11.0 * s);
-  const int sinus = capsule(root - AorticRoot::Below * up, root + 8.0 * up, bore, bore);
-  const int tubular = capsule(root + 8.0 * up, root + 38.0 * up, bore, upper);
-  const int ascending = capsule(root + 38.0 * up, root + AorticRoot::Above * up, upper, upper);
+  const int sinus = capsule(root - AorticRoot::Below * up, sinuses, bore, bore);
+  const int tubular = capsule(sinuses, tubularEnd, bore, upper);
+  const int ascending = capsule(tubularEnd, top, upper, upper);
   const double wall = 1.6;
-  const int sinusWall =
-    capsule(root - AorticRoot::Below * up, root + 8.0 * up, bore + wall, bore + wall);
-  const int tubularWall = capsule(root + 8.0 * up, root + 38.0 * up, bore + wall, upper + wall);
-  const int ascendingWall =
-    capsule(root + 38.0 * up, root + AorticRoot::Above * up, upper + wall, upper + wall);
+  const int sinusWall = capsule(root - AorticRoot::Below * up, sinuses, bore + wall, bore + wall);
+  const int tubularWall = capsule(sinuses, tubularEnd, bore + wall, upper + wall);
+  const int ascendingWall = capsule(tubularEnd, top, upper + wall, upper + wall);
   const Vector3& trunk = anatomy.pulmonaryBase;
   const Vector3& trunkAxis = anatomy.pulmonaryAxis;
   const int pulmonary = capsule(trunk - 14.0 * trunkAxis, trunk + 120.0 * trunkAxis, 11.5, 11.5);

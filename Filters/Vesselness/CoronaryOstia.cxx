@@ -261,6 +261,7 @@ std::array<Matrix3, 5> SliceAxes()
 /// What explains an image best, and from what.
 struct Search
 {
+  std::vector<Candidate> tubes; ///< of the slices along the body
   std::vector<Candidate> candidates;
   std::vector<Hypothesis> explanations;
 };
@@ -290,6 +291,10 @@ Search FindExplanations(
       { return !progress || progress(begin + span * (from + (to - from) * f)); };
     };
     std::vector<Candidate> tubes = FindTubes(image, directions[d], settings, part(0.0, 0.3));
+    if (d == 0)
+    {
+      search.tubes = tubes;
+    }
     std::size_t looked = 0;
     for (std::size_t t = 0; t < tubes.size() && (d == 0 || looked < others); ++t)
     {
@@ -319,6 +324,37 @@ Search FindExplanations(
     }
   }
   return search;
+}
+
+/// The tube that stands behind the ascending aorta; of several the hindmost.
+std::vector<AorticSection> DescendingOf(
+  const std::vector<Candidate>& tubes, const AscendingAorta& ascending)
+{
+  constexpr double shortest = 25.0; // mm
+  constexpr double behind = 30.0;   // mm
+  constexpr double right = 30.0;    // mm
+  constexpr double upright = 0.9;   // cosine
+  std::vector<AorticSection> best;
+  if (ascending.sections.empty())
+  {
+    return best;
+  }
+  const AorticSection& middle = ascending.sections[ascending.sections.size() / 2];
+  for (const Candidate& candidate : tubes)
+  {
+    const std::vector<AorticSection>& sections = candidate.tube.sections;
+    const AorticSection& own = sections[sections.size() / 2];
+    const Vector3 from = own.centre - middle.centre;
+    const Vector3 way = sections.back().centre - sections.front().centre;
+    const bool fits = way[2] >= std::max(shortest, upright * way.norm()) && from[1] > behind &&
+      from[0] > -right && own.radius < 1.1 * middle.radius &&
+      candidate.tube.mean > 0.5 * ascending.mean && candidate.tube.mean < 1.5 * ascending.mean;
+    if (fits && (best.empty() || own.centre[1] > best[best.size() / 2].centre[1]))
+    {
+      best = sections;
+    }
+  }
+  return best;
 }
 
 /// The part of a tube that is aorta, and its blood where the ostia are.
@@ -420,6 +456,8 @@ CoronaryOstia FindCoronaryOstia(
   {
     result.aorta = AortaOf(candidates.front(), {});
   }
+
+  result.descending = DescendingOf(search.tubes, result.aorta);
 
   constexpr double sure = 0.5;
   if (result.aorta.sections.empty())

@@ -62,6 +62,8 @@ struct CoronaryOstium
 struct CoronaryOstia
 {
   AscendingAorta aorta;
+  /// Of the descending aorta, upwards, as far as it stands upright behind the ascending one; empty: not seen.
+  std::vector<AorticSection> descending;
   std::vector<CoronaryOstium> ostia; ///< left, then right, as far as found
   std::string doubt;                 ///< empty, or why the result is not sure
 };

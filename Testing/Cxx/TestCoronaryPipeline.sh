@@ -94,6 +94,8 @@ check_metrics() {
 check_evaluate() {
   # shellcheck disable=SC2086
   run 0 phantom --seed 5 --phases 3 --truth-only --quiet $coarse --output truth
+  grep -q 'Name="Measured"' truth/truth/aorta_wall_01.vtp || fail "no true wall of the aorta"
+  grep -q 'Name="Measured"' truth/truth/aorta_centerline_01.vtp || fail "no true axis of the aorta"
   # The truth as a result of its own: all distances are 0, all branches there.
   run 0 evaluate --result truth --truth truth --output itself
   for file in table1.csv table1.tex table1.json branches.csv review.html plots/HD.svg; do
@@ -892,10 +894,17 @@ check_run() {
   head -c 2000 series/phase_00.mha >series/cut.mha
   sed 's/phase_00/cut/' series/series.json >series/broken.json
   run 0 run series/series.json --scales 0.7 2.5 --until centerline --output result
-  for file in vesselness.mha mask.mha ostia.vtp aorta.vtp centerline.vtp bifurcations.vtp \
+  for file in vesselness.mha mask.mha ostia.vtp aorta.vtp aorta_wall.vtp aorta_centerline.vtp \
+    centerline.vtp bifurcations.vtp \
     centerline_lines.vtp status.csv lesions.csv report.json; do
     [ -s "result/$file" ] || fail "no $file"
   done
+  for name in Measured AortaSource AortaLengths; do
+    grep -q "Name=\"$name\"" result/aorta_wall.vtp || fail "no $name in aorta_wall.vtp"
+    grep -q "Name=\"$name\"" result/aorta_centerline.vtp || fail "no $name in aorta_centerline.vtp"
+  done
+  grep -q '"source": "measured: [1-9][0-9]* mm from the valve to the image' result/report.json \
+    || fail "the report does not tell of the aorta"
   expect_text stdout "LCA at"
   expect_text stdout "RCA at"
   expect_text stderr "stage 3 of 4 (segmentation)"
