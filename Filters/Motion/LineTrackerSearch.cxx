@@ -335,9 +335,6 @@ LineTracker::Seen LineTracker::SearchFinely(bool vessels, double progressFrom)
   const std::vector<std::vector<float>> weights = vessels
     ? std::vector<std::vector<float>>(nodes, this->Fine.weights)
     : this->WithoutVessels(this->Fine, 0.8);
-  // Neighbours see the same tissue, and are wrong together.
-  const double ownShare =
-    std::min(1.0, this->Settings.nodeSpacing / (2.0 * this->Settings.fineRadius));
   const auto search = [&](std::size_t k)
   {
     std::vector<Matrix3> information(nodes, Matrix3::Zero());
@@ -452,10 +449,9 @@ LineTracker::Seen LineTracker::SearchFinely(bool vessels, double progressFrom)
       }
       else
       {
-        information[n] = ownShare *
-          Limited(SignalCurvature(curvature[n], noise / averaged[n]).Information() *
-              (30.0 / std::max<double>(minimum[n], this->NoiseFloor())),
-            std::max(TissueDeviation, 0.8 * this->Voxel));
+        information[n] = Limited(SignalCurvature(curvature[n], noise / averaged[n]).Information() *
+            (30.0 / std::max<double>(minimum[n], this->NoiseFloor())),
+          std::max(TissueDeviation, 0.8 * this->Voxel));
       }
       displacement[n] += this->Displacement[k][n];
     }
