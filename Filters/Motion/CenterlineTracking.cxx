@@ -267,8 +267,10 @@ void LineTracker::Finish(PoseSequence& sequence)
       const double certain = std::min(1.0, sure * sure);
       seen[n] = certain *
         std::clamp((this->Likeness[k][n] - 0.3) / (2.0 * (TrackedLikeness - 0.3)), 0.0, 1.0);
-      // Alike by chance.
-      seen[n] = found[k][n] ? seen[n] : std::min(seen[n], ChanceConfidence);
+      // Alike by chance, or alike elsewhere than the trajectories go.
+      const bool isThere = found[k][n] &&
+        ApartOf(this->Vessels, k, n, this->Displacement[k][n]) <= this->Settings.trackedDeviation;
+      seen[n] = isThere ? seen[n] : std::min(seen[n], ChanceConfidence);
       // What was filled well is worth something to those who smooth the motion.
       confidence[n] = std::max(seen[n], FilledConfidence * certain);
       tracked += seen[n] >= TrackedConfidence ? 1.0 : 0.0;

@@ -200,7 +200,7 @@ void LineTracker::Align(double robustScale, double progressFrom)
       part(0.5, 1.0));
     return Packed(measured, information, likeness);
   };
-  Seen seen{ PerPhase(phases), std::vector<std::vector<Matrix3>>(phases), robustScale };
+  Seen seen{ PerPhase(phases), std::vector<std::vector<Matrix3>>(phases), robustScale, true };
   this->Likeness.assign(phases, {});
   const std::vector<std::string> results = this->OfPhases(align);
   for (std::size_t k = 0; k < phases; ++k)

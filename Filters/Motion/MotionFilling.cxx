@@ -4,6 +4,7 @@
 #include "ParallelFor.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
@@ -414,6 +415,20 @@ bool Filler::Fill(std::size_t node, const Prediction& prediction, const Sighting
 }
 }
 
+double ApartOf(
+  const MotionMeasurements& measured, std::size_t phase, std::size_t node, const Vector3& place)
+{
+  const Vector3 apart = place - measured.displacement[phase][node];
+  const Matrix3& information = measured.information[phase][node];
+  if (!measured.slides || !(information.trace() > 0.0))
+  {
+    return apart.norm();
+  }
+  const double most =
+    Eigen::SelfAdjointEigenSolver<Matrix3>(information, Eigen::EigenvaluesOnly).eigenvalues()[2];
+  return std::sqrt(std::max(apart.dot(information * apart), 0.0) / most);
+}
+
 Trajectories FitRobustly(const LineNodes& nodes, const std::vector<double>& times,
   double referenceTime, const std::vector<const MotionMeasurements*>& measurements,
   const TrajectoryPrior& prior)
@@ -439,7 +454,7 @@ Trajectories FitRobustly(const LineNodes& nodes, const std::vector<double>& time
           if (round > 0)
           {
             const double apart =
-              (motion.Displacement(static_cast<int>(n), times[k]) - displacement).norm();
+              ApartOf(*one, k, n, motion.Displacement(static_cast<int>(n), times[k]));
             share = 1.0 / (1.0 + apart * apart / (scale * scale));
           }
           all[n].push_back({ static_cast<int>(k), displacement,

@@ -24,7 +24,13 @@ struct MotionMeasurements
   std::vector<std::vector<Vector3>> displacement; ///< per phase and node, mm
   std::vector<std::vector<Matrix3>> information;  ///< of each, 1/mm^2; zero: nothing
   double robustScale = 1.0;                       ///< mm; what is farther from the fit counts less
+  /// A direction of which it says nothing does not make it farther: vessels are found across, not along them.
+  bool slides = false;
 };
+
+/// How far a place is from what was measured of a node at a phase, mm. @param place  as its displacement
+double ApartOf(
+  const MotionMeasurements& measured, std::size_t phase, std::size_t node, const Vector3& place);
 
 /// The most probable trajectories, which are at rest at the reference time. Measurements that do not agree with them
 /// count less (Geman & McClure).

@@ -15,7 +15,8 @@
 // / m per square root of a mm across it, 0.08 along it: a vessel bends more than it stretches. A measurement z_ik with
 // information L_ik counts as
 //     w^2 (u_i(t_k) - z_ik)^T L_ik (u_i(t_k) - z_ik),   w = 1 / (1 + |u_i(t_k) - z_ik|^2 / s^2)
-// (Geman & McClure), s falling to 0.5 mm. Given the weights, the most probable trajectories and their covariance are
+// (Geman & McClure), s falling to 0.5 mm; of aligned vessels the distance is weighed by L_ik over its greatest
+// eigenvalue (ApartOf). Given the weights, the most probable trajectories and their covariance are
 // exact: the tree is eliminated from its tips to the roots and back.
 
 namespace coronary

@@ -263,4 +263,41 @@ TEST(MotionFilling, DoesNotBelieveAWholeBranchOfWrongTissue)
   slide(0.0);
   EXPECT_LT(error(true), 0.3);
 }
+
+TEST(MotionFilling, HowFarCountsOnlyWhereSomethingIsSaid)
+{
+  MotionMeasurements measured;
+  measured.displacement = { { Vector3(1.0, 0.0, 0.0) } };
+  measured.information = { { Vector3(4.0, 1.0, 0.0).asDiagonal().toDenseMatrix() } };
+  const Vector3 place(1.3, 2.0, 7.0);
+  EXPECT_DOUBLE_EQ(ApartOf(measured, 0, 0, place), Vector3(0.3, 2.0, 7.0).norm());
+  measured.slides = true;
+  EXPECT_NEAR(ApartOf(measured, 0, 0, place), std::sqrt(0.3 * 0.3 + 2.0 * 2.0 / 4.0), 1e-12);
+}
+
+TEST(MotionFilling, AVesselThatSlidAlongItselfStillTellsWhereItIsAcross)
+{
+  const LineNodes nodes = PlaceNodes(Vessels(), 2.0);
+  const auto truth = Moved(nodes, Affine);
+  MotionMeasurements vessels = Measured(truth, 0.15, 0.5);
+  MotionMeasurements tissue = Measured(truth, 0.5, 1.5);
+  for (std::size_t k = 0; k < truth.size(); ++k)
+  {
+    for (std::size_t n = 0; n < nodes.size(); ++n)
+    {
+      // 3 mm off along z, of which they say nothing; the tissue is 1 mm off across.
+      vessels.displacement[k][n] += Vector3(0.0, 0.0, 3.0);
+      vessels.information[k][n](2, 2) = 0.0;
+      tissue.displacement[k][n] += Beat(Times()[k]) * Vector3(1.0, 0.0, 0.0);
+    }
+  }
+  const auto error = [&]()
+  {
+    return Farthest(
+      FitRobustly(nodes, Times(), Reference, { &vessels, &tissue }, TrajectoryPrior()), truth);
+  };
+  EXPECT_GT(error(), 0.8);
+  vessels.slides = true;
+  EXPECT_LT(error(), 0.3);
+}
 }
