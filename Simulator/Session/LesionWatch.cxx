@@ -359,7 +359,7 @@ std::vector<LesionResult> LesionWatch::Results(
     const Watched& one = this->Lesions[n];
     LesionResult result;
     result.branch = one.lesion.branch;
-    result.vessel = one.lesion.vessel;
+    result.vessel = this->NameOfBranch(result.branch);
     result.reference = 2.0 * one.reference;
     result.degreeBefore = result.degree = one.lesion.degree;
     result.least = 2.0 * one.reference * (1.0 - one.lesion.degree);
