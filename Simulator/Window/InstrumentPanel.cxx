@@ -64,6 +64,7 @@ InstrumentPanel::InstrumentPanel()
     box->setToolTip("Taken at the next new session");
   }
   this->Text->setTextFormat(Qt::PlainText);
+  this->Text->setWordWrap(true);
   auto* form = new QFormLayout(this);
   form->addRow("Wire", this->Wire);
   form->addRow("Catheter", this->Catheter);
