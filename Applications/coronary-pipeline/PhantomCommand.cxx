@@ -244,6 +244,7 @@ public:
     {
       this->Stems.emplace_back("wall");
     }
+    this->FindGrid();
     if (job.scanner.Given())
     {
       this->MakeScanner();
@@ -359,7 +360,6 @@ private:
   /// A scanner with the heart in it, before anything is computed: a wrong setting is told at once.
   void MakeScanner()
   {
-    this->FindGrid();
     this->Anatomy = std::make_unique<ScannedPhantom>(this->TruePhantom());
     this->Scanner = std::make_unique<ImageScan>(
       *this->Anatomy, this->Job.scan, this->Grid, this->Times, this->Job.variants);
@@ -428,7 +428,6 @@ private:
   /// What the image holds of the aorta, completed as `run` completes it.
   void WriteAorta(StagedFolder& folder, std::size_t index, double time)
   {
-    this->FindGrid();
     std::vector<AorticRing> rings = this->TruePhantom().Aorta(time);
     const Vector3 low(this->Grid.extent[0], this->Grid.extent[2], this->Grid.extent[4]);
     const Vector3 high(this->Grid.extent[1], this->Grid.extent[3], this->Grid.extent[5]);
@@ -541,10 +540,8 @@ Command MakePhantomCommand(CLI::App& program)
   app->footer(
     "Writes DIR/phase_NN.mha, DIR/truth/surface_NN.vtp, centerline_NN.vtp, vein_NN.vtp, "
     "aorta_wall_NN.vtp, aorta_centerline_NN.vtp and, last, DIR/series.json, with NN from 00; with "
-    "disease DIR/truth/disease.json and "
-    "wall_NN.vtp; with --scanner DIR/scan.json: what is in DIR/scan-parts until all is written "
-    "lets "
-    "a scan that was stopped go on.");
+    "disease DIR/truth/disease.json and wall_NN.vtp; with --scanner DIR/scan.json: what is in "
+    "DIR/scan-parts until all is written lets a scan that was stopped go on.");
   auto job = std::make_shared<PhantomJob>();
   job->Declare(*app);
   return { app,

@@ -49,8 +49,7 @@ std::string DescribeAorta(const AorticModel& aorta, const std::string& ending)
   std::snprintf(text.data(), text.size(),
     "measured: %.0f mm from the valve to %s, ascending diameter %.1f mm; completed: %.0f mm of "
     "ascending aorta, %.0f mm of arch and %.0f mm of descending aorta to the diaphragm, with the "
-    "mean "
-    "diameters of Hager 2002 scaled to that one, %s",
+    "mean diameters of Hager 2002 scaled to that one, %s",
     aorta.measuredLength, ending.c_str(), 2.0 * aorta.ascendingRadius, aorta.ascending, aorta.arch,
     aorta.descending,
     aorta.towardsSeen ? "to where the image shows the descending aorta" : "on a usual course");

@@ -1,7 +1,6 @@
 #include "vtkRunAorta.h"
 
 #include "AorticWall.h"
-#include "Interruption.h"
 #include "ReportJson.h"
 #include "RunSettings.h"
 #include "vtkAortaData.h"
@@ -20,33 +19,10 @@ namespace coronary
 {
 using Json = nlohmann::ordered_json;
 
-void NeedOstia(const RunStep& step)
-{
-  RunInput& input = step.input;
-  double range[2];
-  RangeOf(input.Reference, range);
-  if (input.Ostia || range[1] - range[0] < MinimumRangeOfHU)
-  {
-    return;
-  }
-  std::vector<float> copy;
-  const ScalarImage voxels = vtkCoronary::ScalarImageOf(
-    input.Reference, input.Reference->GetPointData()->GetScalars(), copy);
-  try
-  {
-    input.Ostia = std::make_shared<CoronaryOstia>(
-      FindCoronaryOstia(voxels, {}, [](double) { return Interruption() == 0; }));
-  }
-  catch (const std::invalid_argument&)
-  {
-    // Who needs the image says what is wrong with it.
-  }
-}
-
 Json MakeAorta(RunStep& step)
 {
   RunInput& input = step.input;
-  NeedOstia(step);
+  FindOstia(step);
   AorticWall wall;
   wall.why = "the values are no HU";
   AorticModel aorta;

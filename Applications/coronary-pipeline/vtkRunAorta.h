@@ -9,9 +9,6 @@
 
 namespace coronary
 {
-/// Looks for aorta and ostia in the reference phase, if that was not done yet and the image may have them.
-void NeedOstia(const RunStep& step);
-
 /**
  * Writes aorta_wall.vtp and aorta_centerline.vtp. Where there is no aorta to be seen, or what is found is none, a warning
  * says so, and there are no such files.

@@ -86,34 +86,52 @@ void RequireOstia(const RunStep& step, const std::vector<double>& confidences)
   throw std::runtime_error("'" + step.input.Chosen->image + "': " + text + ".");
 }
 
-void FindHeart(RunStep& step)
+void FindOstia(const RunStep& step, const std::function<void(double)>& progress)
 {
   RunInput& input = step.input;
-  const RunSettings& settings = input.Settings;
-  vtkImageData* image = input.Reference;
+  if (input.Ostia)
+  {
+    return;
+  }
   double range[2];
-  RangeOf(image, range);
-  // With c measured the region would have a say in it.
-  if (!input.Seeds.empty() || input.HasMasks() || settings.beyondMask || !(settings.c > 0.0) ||
-    range[1] - range[0] < MinimumRangeOfHU)
+  RangeOf(input.Reference, range);
+  if (range[1] - range[0] < MinimumRangeOfHU)
   {
     return;
   }
   std::vector<float> copy;
-  const ScalarImage voxels =
-    vtkCoronary::ScalarImageOf(image, image->GetPointData()->GetScalars(), copy);
-  const auto progress = [&](double fraction)
+  const ScalarImage voxels = vtkCoronary::ScalarImageOf(
+    input.Reference, input.Reference->GetPointData()->GetScalars(), copy);
+  const auto go = [&](double fraction)
   {
-    step.progress(fraction);
+    if (progress)
+    {
+      progress(fraction);
+    }
     return Interruption() == 0;
   };
   try
   {
-    input.Ostia = std::make_shared<CoronaryOstia>(FindCoronaryOstia(voxels, {}, progress));
+    input.Ostia = std::make_shared<CoronaryOstia>(FindCoronaryOstia(voxels, {}, go));
   }
   catch (const std::invalid_argument&)
   {
     // Who needs the image says what is wrong with it.
+  }
+}
+
+void FindHeart(RunStep& step)
+{
+  RunInput& input = step.input;
+  const RunSettings& settings = input.Settings;
+  // With c measured the region would have a say in it.
+  if (!input.Seeds.empty() || input.HasMasks() || settings.beyondMask || !(settings.c > 0.0))
+  {
+    return;
+  }
+  FindOstia(step, step.progress);
+  if (!input.Ostia)
+  {
     return;
   }
   std::vector<double> confidences;
@@ -131,7 +149,15 @@ void FindHeart(RunStep& step)
   {
     places.push_back(ostium.position);
   }
-  input.Region = std::make_shared<HeartRegion>(voxels, places, progress);
+  std::vector<float> copy;
+  const ScalarImage voxels = vtkCoronary::ScalarImageOf(
+    input.Reference, input.Reference->GetPointData()->GetScalars(), copy);
+  input.Region = std::make_shared<HeartRegion>(voxels, places,
+    [&](double fraction)
+    {
+      step.progress(fraction);
+      return Interruption() == 0;
+    });
 }
 
 vtkSmartPointer<vtkImageData> HeartMask(RunStep& step)

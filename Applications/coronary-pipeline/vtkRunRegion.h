@@ -32,6 +32,13 @@ constexpr double MinimumOstialConfidence = 0.1;
 void RequireOstia(const RunStep& step, const std::vector<double>& confidences);
 
 /**
+ * The aorta and the ostia of the reference phase, into the input, unless they are there already or the image can not have them: no
+ * HU, or what FindCoronaryOstia refuses (who needs the image says what is wrong with it).
+ * @throws Cancelled
+ */
+void FindOstia(const RunStep& step, const std::function<void(double)>& progress = {});
+
+/**
  * The ostia of the reference phase and the region around them, into the input; no region where the ostia are not sure, where
  * seeds or a mask are given, or where the image is not HU.
  * @throws Cancelled

@@ -471,7 +471,7 @@ Json MakeSegmentation(RunStep& step)
   {
     if (given.empty())
     {
-      NeedOstia(step);
+      FindOstia(step);
     }
     Segment(step, mask, seeds, aorta, bridges);
     numbers["window"] = Numbers(mask, vtkCoronaryArrayNames::BloodWindow);

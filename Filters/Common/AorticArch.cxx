@@ -1,5 +1,6 @@
 #include "AorticArch.h"
 
+#include "CubicStep.h"
 #include "Numbers.h"
 #include "Require.h"
 
@@ -15,12 +16,6 @@ namespace
 constexpr double AscendingDiameter = 30.9; ///< mm, Hager
 constexpr double IsthmusDiameter = 24.7;
 constexpr double DiaphragmDiameter = 24.3;
-
-double Ease(double u)
-{
-  u = std::clamp(u, 0.0, 1.0);
-  return u * u * (3.0 - 2.0 * u);
-}
 
 /// The arc in a frame of up, across and the normal of the two.
 struct Arc
@@ -41,7 +36,8 @@ struct Arc
   Vector3 Direction(double s) const
   {
     // Upright in its plane again well before the arc ends.
-    const double lean = this->leaning * (1.0 - Ease(s / (this->straight + 0.75 * this->Length())));
+    const double lean =
+      this->leaning * (1.0 - CubicStep(s / (this->straight + 0.75 * this->Length())));
     const double phi = this->Turned(s);
     return std::cos(lean) * (std::cos(phi) * this->up + std::sin(phi) * this->across) +
       std::sin(lean) * this->normal;
@@ -198,7 +194,7 @@ AorticCourse CompleteAorta(const AorticEnd& end, const AorticArchSettings& setti
       course.descending > 0.0 ? std::max(0.0, station.length - turnedBy) / course.descending : 0.0;
     const double taper = AorticArchTaper(arc.Turned(station.length)) +
       down * (DiaphragmDiameter - IsthmusDiameter) / AscendingDiameter;
-    station.radius = end.ascendingRadius * taper + own * (1.0 - Ease(station.length / blend));
+    station.radius = end.ascendingRadius * taper + own * (1.0 - CubicStep(station.length / blend));
   }
   return course;
 }

@@ -1,5 +1,6 @@
 #include "AorticModel.h"
 
+#include "CubicStep.h"
 #include "Median.h"
 #include "Numbers.h"
 #include "Require.h"
@@ -46,8 +47,7 @@ std::vector<AorticRing> RingsAround(const AorticCourse& course, const AorticRing
       turn =
         Eigen::AngleAxisd(std::atan2(sine, before.dot(station.direction)), about / sine) * turn;
     }
-    const double u = std::min(1.0, station.length / fade);
-    const double own = 1.0 - u * u * (3.0 - 2.0 * u);
+    const double own = 1.0 - CubicStep(station.length / fade);
     AorticRing ring;
     ring.centre = station.position;
     for (const Vector3& offset : offsets)

@@ -1,6 +1,7 @@
 #include "PatientHeart.h"
 
 #include "CoronaryAnatomy.h"
+#include "CubicStep.h"
 #include "Median.h"
 #include "Require.h"
 #include "SegmentAtlas.h"
@@ -307,8 +308,7 @@ double PatientHeart::SeptumDistance(const Vector3& q) const
 
 double PatientHeart::RightShare(const Vector3& q) const
 {
-  const double u = std::clamp(this->SeptumDistance(q) / this->rightWidth, 0.0, 1.0);
-  return u * u * (3.0 - 2.0 * u);
+  return CubicStep(this->SeptumDistance(q) / this->rightWidth);
 }
 
 PatientHeart EstimateHeart(const VesselTree& tree, const HeartPose& named)

@@ -1,5 +1,7 @@
 #include "SweptLumenBuild.h"
 
+#include "CubicStep.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,12 +12,6 @@ namespace
 {
 /// Where two walls face each other, a rounded minimum of radius k lies this many k above both.
 const double RoundedDepth = 1.0 - std::sqrt(0.5);
-
-double SmoothStep(double x)
-{
-  x = std::clamp(x, 0.0, 1.0);
-  return x * x * (3.0 - 2.0 * x);
-}
 
 /// Intersection of two half-spaces' complements with a rounded edge: used where tubes give way.
 struct RoundUnion
@@ -159,7 +155,7 @@ void SweptLumen::EvaluateJunction(
             edge, tubes[side].piece, there);
           gap = std::max(gap, there.distance);
         }
-        open = SmoothStep((0.8 - gap / outside) / 0.35);
+        open = CubicStep((0.8 - gap / outside) / 0.35);
       }
       if (minimum * open > k)
       {
@@ -208,7 +204,7 @@ double SweptLumen::Fillet::RadiusAt(const Vector3& position, Vector3* gradient) 
     *gradient = -this->radius * 6.0 * x * (1.0 - x) * 2.5 /
       (this->reach * std::max(1e-12, distance)) * offset;
   }
-  return this->radius * SmoothStep(x);
+  return this->radius * CubicStep(x);
 }
 
 void SweptLumen::GiveWay(const Vector3& position, int part, Sample& sample) const

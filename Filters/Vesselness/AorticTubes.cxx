@@ -3,8 +3,6 @@
 #include "Median.h"
 #include "Numbers.h"
 
-#include <Eigen/Cholesky>
-
 #include <algorithm>
 #include <cmath>
 
@@ -254,19 +252,16 @@ private:
         return false;
       }
       const double middle = MedianOf(distances);
-      // Least squares circle through the points near the median distance (Kasa).
+      // Through the points near the median distance.
       rim.clear();
-      Matrix3 normal = Matrix3::Zero();
-      Vector3 right = Vector3::Zero();
+      CircleFit fit;
       for (const auto& p : points)
       {
         const double u = p[0] - disc.x;
         const double v = p[1] - disc.y;
         if (std::abs(std::hypot(u, v) * h - middle) < 0.15 * middle)
         {
-          const Vector3 row(u, v, 1.0);
-          normal += row * row.transpose();
-          right += row * (u * u + v * v);
+          fit.Add(u, v);
           rim.push_back(p);
         }
       }
@@ -274,10 +269,8 @@ private:
       {
         return false;
       }
-      const Vector3 solution = normal.ldlt().solve(right);
-      const double cx = 0.5 * solution[0];
-      const double cy = 0.5 * solution[1];
-      const double radius = std::sqrt(std::max(0.0, solution[2] + cx * cx + cy * cy)) * h;
+      const auto [cx, cy, power] = fit.Solve();
+      const double radius = std::sqrt(std::max(0.0, power + cx * cx + cy * cy)) * h;
       if (!(std::hypot(cx, cy) * h < disc.radius) || !(radius > settings.minimumAorticRadius) ||
         !(radius < settings.maximumAorticRadius))
       {
@@ -455,16 +448,13 @@ public:
         return 0.0;
       }
       const double middle = MedianOf(distances);
-      Matrix3 normal = Matrix3::Zero();
-      Vector3 right = Vector3::Zero();
+      CircleFit fit;
       rim.clear();
       for (const auto& p : points)
       {
         if (std::abs(std::hypot(p[0], p[1]) - middle) < 0.15 * middle)
         {
-          const Vector3 row(p[0], p[1], 1.0);
-          normal += row * row.transpose();
-          right += row * (p[0] * p[0] + p[1] * p[1]);
+          fit.Add(p[0], p[1]);
           rim.push_back(p);
         }
       }
@@ -472,9 +462,9 @@ public:
       {
         return 0.0;
       }
-      const Vector3 solution = normal.ldlt().solve(right);
-      const Vector3 move = 0.5 * solution[0] * u + 0.5 * solution[1] * v;
-      const double radius = std::sqrt(std::max(0.0, solution[2] + move.squaredNorm()));
+      const CircleFit::Circle circle = fit.Solve();
+      const Vector3 move = circle.x * u + circle.y * v;
+      const double radius = std::sqrt(std::max(0.0, circle.power + move.squaredNorm()));
       if (!(move.norm() < section.radius) || !(radius > this->Settings.minimumAorticRadius) ||
         !(radius < this->Settings.maximumAorticRadius))
       {
@@ -482,7 +472,7 @@ public:
       }
       for (auto& p : rim)
       {
-        p = { p[0] - 0.5 * solution[0], p[1] - 0.5 * solution[1] };
+        p = { p[0] - circle.x, p[1] - circle.y };
       }
       section.centre += move;
       section.radius = radius;

@@ -8,6 +8,8 @@
 #include "CoronaryOstia.h"
 #include "WorldVolume.h"
 
+#include <Eigen/Cholesky>
+
 #include <vector>
 
 namespace coronary
@@ -18,6 +20,35 @@ struct AorticTube
   std::vector<AorticSection> sections;
   std::vector<double> scores; ///< of each section, 0 to 1: how much of a round rim is there
   double mean = 0.0;          ///< HU
+};
+
+/// The least-squares circle (Kasa) through points of a plane.
+class CircleFit
+{
+public:
+  struct Circle
+  {
+    double x;
+    double y;
+    double
+      power; ///< of the origin, its sign turned: the squared radius less the centre's squared distance
+  };
+
+  void Add(double x, double y)
+  {
+    const Vector3 row(x, y, 1.0);
+    this->Normal += row * row.transpose();
+    this->Right += row * (x * x + y * y);
+  }
+  Circle Solve() const
+  {
+    const Vector3 solution = this->Normal.ldlt().solve(this->Right);
+    return { 0.5 * solution[0], 0.5 * solution[1], solution[2] };
+  }
+
+private:
+  Matrix3 Normal = Matrix3::Zero();
+  Vector3 Right = Vector3::Zero();
 };
 
 /**

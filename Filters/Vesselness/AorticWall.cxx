@@ -1,6 +1,7 @@
 #include "AorticWall.h"
 
 #include "AorticTubes.h"
+#include "CrossFrame.h"
 #include "Median.h"
 #include "Numbers.h"
 #include "WorldVolume.h"
@@ -44,24 +45,18 @@ struct WallFrame
 {
   Vector3 centre;
   Vector3 normal;
-  Vector3 u;
-  Vector3 v;
-  double radius = 0.0; ///< mm, about
+  CrossFrame across;
+  double radius; ///< mm, about
 
-  Vector3 Ray(int n) const
+  WallFrame(const Vector3& place, const Vector3& way, double about)
+    : centre(place)
+    , normal(way.normalized())
+    , across(this->normal)
+    , radius(about)
   {
-    const double angle = 2.0 * Pi * n / WallRays;
-    return std::cos(angle) * this->u + std::sin(angle) * this->v;
   }
+  Vector3 Ray(int n) const { return this->across.Ray(n, WallRays); }
 };
-
-WallFrame WallFrameAt(const Vector3& centre, const Vector3& normal, double radius)
-{
-  WallFrame frame{ centre, normal.normalized(), {}, {}, radius };
-  frame.u = frame.normal.unitOrthogonal();
-  frame.v = frame.normal.cross(frame.u);
-  return frame;
-}
 
 /// Looks along rays in an image.
 class RayImage
@@ -222,17 +217,14 @@ double FitWallCircle(const RayImage& image, WallFrame& frame, WallRaySet& sectio
       return 0.0;
     }
     const double middle = MedianOf(radii);
-    Matrix3 normal = Matrix3::Zero();
-    Vector3 right = Vector3::Zero();
+    CircleFit fit;
     near = 0;
     for (const auto& [radius, ray] : picked)
     {
       if (std::abs(radius - middle) < 0.2 * middle)
       {
         const double angle = 2.0 * Pi * ray / WallRays;
-        const Vector3 row(radius * std::cos(angle), radius * std::sin(angle), 1.0);
-        normal += row * row.transpose();
-        right += row * (radius * radius);
+        fit.Add(radius * std::cos(angle), radius * std::sin(angle));
         ++near;
       }
     }
@@ -240,15 +232,13 @@ double FitWallCircle(const RayImage& image, WallFrame& frame, WallRaySet& sectio
     {
       return 0.0;
     }
-    const Vector3 solution = normal.ldlt().solve(right);
-    const double x = 0.5 * solution[0];
-    const double y = 0.5 * solution[1];
-    const double radius = std::sqrt(std::max(0.0, solution[2] + x * x + y * y));
+    const auto [x, y, power] = fit.Solve();
+    const double radius = std::sqrt(std::max(0.0, power + x * x + y * y));
     if (!(std::hypot(x, y) < 0.5 * frame.radius) || !(radius > 0.0))
     {
       return 0.0;
     }
-    frame.centre += x * frame.u + y * frame.v;
+    frame.centre += frame.across.Place(x, y);
     frame.radius = radius;
   }
   return static_cast<double>(near) / WallRays;
@@ -269,7 +259,7 @@ bool FollowWall(
   for (double length = 0.0; missed <= longestGap && length < farthest; length += step)
   {
     at.centre += step * at.normal;
-    WallFrame found = WallFrameAt(at.centre, at.normal, at.radius);
+    WallFrame found = WallFrame(at.centre, at.normal, at.radius);
     WallRaySet section;
     const double share = FitWallCircle(image, found, section);
     if (section.inside < 0.9 * WallRays)
@@ -297,7 +287,7 @@ bool FollowWall(
     {
       frames.back().normal = (0.7 * found.normal + 0.3 * chord.normalized()).normalized();
     }
-    at = WallFrameAt(found.centre, frames.back().normal, found.radius);
+    at = WallFrame(found.centre, frames.back().normal, found.radius);
     if (rises * at.normal[2] < lowest)
     {
       return false;
@@ -406,7 +396,7 @@ std::vector<WallFrame> WallFramesAlong(
       ++at;
     }
     const double part = (s - lengths[at - 1]) / std::max(1e-9, lengths[at] - lengths[at - 1]);
-    frames.push_back(WallFrameAt(line[at - 1] + part * (line[at] - line[at - 1]), Vector3::UnitZ(),
+    frames.push_back(WallFrame(line[at - 1] + part * (line[at] - line[at - 1]), Vector3::UnitZ(),
       radii[at - 1] + part * (radii[at] - radii[at - 1])));
   }
   for (int n = 0; n <= steps; ++n)
@@ -417,12 +407,13 @@ std::vector<WallFrame> WallFramesAlong(
     frames[n].normal = (frames[high].centre - frames[low].centre).normalized();
     if (n == 0)
     {
-      frames[n] = WallFrameAt(frames[n].centre, frames[n].normal, frames[n].radius);
+      frames[n] = WallFrame(frames[n].centre, frames[n].normal, frames[n].radius);
       continue;
     }
-    frames[n].u = frames[n - 1].u - frames[n - 1].u.dot(frames[n].normal) * frames[n].normal;
-    frames[n].u.normalize();
-    frames[n].v = frames[n].normal.cross(frames[n].u);
+    const Vector3& before = frames[n - 1].across.u;
+    CrossFrame& across = frames[n].across;
+    across.u = (before - before.dot(frames[n].normal) * frames[n].normal).normalized();
+    across.v = frames[n].normal.cross(across.u);
   }
   return frames;
 }
@@ -671,7 +662,7 @@ AorticWall MeasureAorticWall(const ScalarImage& image, const CoronaryOstia& foun
   std::vector<WallFrame> frames;
   for (const AorticSection& section : sections)
   {
-    frames.push_back(WallFrameAt(section.centre, section.normal, section.radius));
+    frames.push_back(WallFrame(section.centre, section.normal, section.radius));
   }
   wall.toBorder = FollowWall(rays, found.aorta.mean, farthest, clear, frames);
 

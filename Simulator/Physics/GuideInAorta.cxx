@@ -1,11 +1,12 @@
 #include "GuideInAorta.h"
 
+#include "CurveGeometry.h"
 #include "Fnv1a.h"
 #include "Numbers.h"
+#include "SettingLimits.h"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <stdexcept>
 
@@ -19,27 +20,6 @@ constexpr double TubeLossTime = 2e-3;  // s
 constexpr double TubeSpinDrag = 1e-6;  // N s
 constexpr int FewestSegments = 4;
 constexpr double MillimetresOfMercury = 133.322; // Pa
-
-void RequireOfGuide(double value, double low, double high, const char* name)
-{
-  if (!(value >= low && value <= high))
-  {
-    char text[160];
-    std::snprintf(text, sizeof(text), "%s of the guide must be within %g .. %g, not %g", name, low,
-      high, value);
-    throw std::invalid_argument(text);
-  }
-}
-
-double LengthOf(const std::vector<Vector3>& line)
-{
-  double length = 0.0;
-  for (std::size_t i = 1; i < line.size(); ++i)
-  {
-    length += (line[i] - line[i - 1]).norm();
-  }
-  return length;
-}
 
 double BendingOf(const CatheterSection& section)
 {
@@ -63,12 +43,12 @@ RodSettings TubeSettings()
 
 void GuideSettings::Validate() const
 {
-  RequireOfGuide(this->tickRate, 500.0, 20000.0, "tickRate");
-  RequireOfGuide(this->tipSegment, 0.5, 4.0, "tipSegment");
-  RequireOfGuide(this->shaftSegment, 0.5, 10.0, "shaftSegment");
-  RequireOfGuide(this->start, 10.0, 3000.0, "start");
-  RequireOfGuide(this->capacity, 20, 1000, "capacity");
-  RequireOfGuide(this->drag, 0.0, 10.0, "drag");
+  RequireWithin(this->tickRate, 500.0, 20000.0, "tickRate of the guide");
+  RequireWithin(this->tipSegment, 0.5, 4.0, "tipSegment of the guide");
+  RequireWithin(this->shaftSegment, 0.5, 10.0, "shaftSegment of the guide");
+  RequireWithin(this->start, 10.0, 3000.0, "start of the guide");
+  RequireWithin(this->capacity, 20, 1000, "capacity of the guide");
+  RequireWithin(this->drag, 0.0, 10.0, "drag of the guide");
 }
 
 GuidePieces MakeGuidePieces(const GuideCatheter& guide, const GuideSettings& settings)
@@ -147,9 +127,11 @@ GuideInAorta::GuideInAorta(
   , Bare(this->Pieces.joints)
   , Tube(static_cast<std::int64_t>(this->Pieces.segments.size()), TubeSettings())
 {
-  if (way.size() < 2 || !(LengthOf(way) >= settings.start) || !((way[1] - way[0]).norm() > 0.0))
+  if (way.size() < 2 || !(PolylineLength(way) >= settings.start) ||
+    !((way[1] - way[0]).norm() > 0.0))
   {
-    throw std::invalid_argument("the way along the aorta is " + std::to_string(LengthOf(way)) +
+    throw std::invalid_argument("the way along the aorta is " +
+      std::to_string(PolylineLength(way)) +
       " mm long, shorter than the guide that is in it at the beginning");
   }
   this->Entry = way.front();

@@ -6,6 +6,7 @@
 #include "CyclicTime.h"
 #include "DisjointSets.h"
 #include "Fnv1a.h"
+#include "SettingLimits.h"
 #include "VesselWall.h"
 #include "WallMotion.h"
 #include "WireInGuide.h"
@@ -41,16 +42,6 @@ double Hardening(double gap)
   constexpr double deepInside = 0.05;   // mm
   constexpr double twiceAsHard = 0.025; // mm deeper
   return 1.0 + std::max(0.0, -gap - deepInside) / twiceAsHard;
-}
-
-void RequireWithin(double value, double low, double high, const char* name)
-{
-  if (!(value >= low && value <= high))
-  {
-    char text[160];
-    std::snprintf(text, sizeof(text), "%s must be within %g .. %g, not %g", name, low, high, value);
-    throw std::invalid_argument(text);
-  }
 }
 
 enum class Notice : int
