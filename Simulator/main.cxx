@@ -76,6 +76,11 @@ void Request::Declare(CLI::App& app)
     ->type_name("NAME")
     ->group(what);
   app
+    .add_flag("--guide-from-arch", this->session.guideFromArch,
+      "The guide catheter lies in the aorta and has to be brought to the ostium, where the vessels "
+      "have an aorta")
+    ->group(what);
+  app
     .add_option("--balloon", this->session.balloon,
       "Balloon of the built-in catalogue in place of the scenario's")
     ->type_name("NAME")

@@ -15,20 +15,21 @@ namespace coronary
 {
 struct HeadlessOptions
 {
-  std::string scenario;     ///< file or built-in name; may be empty with replay
-  std::string patient;      ///< images in place of the scenario's vessels and background
-  std::string vessels;      ///< folder in place of the scenario's vessels; of the patient's model
-  std::string wire;         ///< of the built-in catalogue, in place of the scenario's
-  std::string catheter;     ///< likewise
-  std::string balloon;      ///< likewise
-  std::string replay;       ///< recording to go through
-  std::string script;       ///< or script
-  std::string record;       ///< recording to write
-  std::string output;       ///< folder
-  std::uint64_t ticks = 0;  ///< 0: to the end of replay or script
-  double outputRate = 20.0; ///< Hz
-  double heartRate = -1.0;  ///< beats a minute; negative: the scenario's
-  bool verify = false;      ///< hashes have to be those of the recording
+  std::string scenario;       ///< file or built-in name; may be empty with replay
+  std::string patient;        ///< images in place of the scenario's vessels and background
+  std::string vessels;        ///< folder in place of the scenario's vessels; of the patient's model
+  std::string wire;           ///< of the built-in catalogue, in place of the scenario's
+  std::string catheter;       ///< likewise
+  std::string balloon;        ///< likewise
+  bool guideFromArch = false; ///< the scenario's guide has to be brought to the ostium
+  std::string replay;         ///< recording to go through
+  std::string script;         ///< or script
+  std::string record;         ///< recording to write
+  std::string output;         ///< folder
+  std::uint64_t ticks = 0;    ///< 0: to the end of replay or script
+  double outputRate = 20.0;   ///< Hz
+  double heartRate = -1.0;    ///< beats a minute; negative: the scenario's
+  bool verify = false;        ///< hashes have to be those of the recording
   bool writeWall = false;
   bool xray = false;  ///< X-ray frames as pictures
   bool scene = false; ///< the anatomy as pictures

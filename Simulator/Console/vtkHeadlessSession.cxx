@@ -457,6 +457,7 @@ Scenario ScenarioOf(const HeadlessOptions& options)
   {
     scenario.catheter = BuiltInCatalogue().Catheter(options.catheter).catheter;
   }
+  scenario.settings.guideFromArch = scenario.settings.guideFromArch || options.guideFromArch;
   if (!options.balloon.empty())
   {
     scenario.balloon = BuiltInCatalogue().Balloon(options.balloon).balloon;

@@ -112,6 +112,10 @@ vtkSimulatorScene::vtkSimulatorScene(WallMotion& wall, const Scenario& scenario,
   {
     this->MakeHeart();
   }
+  if (wall.Topology().aorta)
+  {
+    this->MakeAorta(wall.Topology());
+  }
   this->MakeInstruments(scenario);
   this->MakeTracers();
   this->MakeWall(wall, settings.triangles);
@@ -245,6 +249,23 @@ void vtkSimulatorScene::MakeHeart()
   look->SetSpecular(0.08);
 }
 
+void vtkSimulatorScene::MakeAorta(const WallTopology& topology)
+{
+  this->Aorta = std::make_unique<AortaMotion>(topology);
+  UsePoints(this->AortaMesh);
+  SetPoints(this->AortaMesh, topology.aorta->points);
+  SetTriangles(this->AortaMesh, topology.aorta->triangles);
+  vtkNew<vtkPolyDataMapper> mapper;
+  mapper->SetInputData(this->AortaMesh);
+  Draw(this->Renderer_, this->AortaActor, mapper);
+  vtkProperty* look = this->AortaActor->GetProperty();
+  look->SetColor(0.86, 0.5, 0.42);
+  look->SetOpacity(0.16);
+  look->SetAmbient(0.5);
+  look->SetDiffuse(0.5);
+  look->BackfaceCullingOn();
+}
+
 void vtkSimulatorScene::MakeInstruments(const Scenario& scenario)
 {
   const auto make =
@@ -347,7 +368,8 @@ void vtkSimulatorScene::SetStents(const std::vector<StentShape>& stents)
 
 std::int64_t vtkSimulatorScene::NumberOfTriangles() const
 {
-  return this->WallMesh->GetNumberOfPolys() + this->HeartMesh->GetNumberOfPolys();
+  return this->WallMesh->GetNumberOfPolys() + this->HeartMesh->GetNumberOfPolys() +
+    this->AortaMesh->GetNumberOfPolys();
 }
 
 void vtkSimulatorScene::Update(const SessionSnapshot& snapshot)
@@ -361,6 +383,12 @@ void vtkSimulatorScene::Update(const SessionSnapshot& snapshot)
   {
     this->Heart->Positions(snapshot.report.phase, this->HeartPoints);
     SetPoints(this->HeartMesh, this->HeartPoints);
+  }
+  this->AortaActor->SetVisibility(this->Aorta && snapshot.guideFromArch);
+  if (this->AortaActor->GetVisibility() != 0)
+  {
+    this->Aorta->Positions(snapshot.axis, this->AortaPoints);
+    SetPoints(this->AortaMesh, this->AortaPoints);
   }
   SetLine(this->WireLine, snapshot.wire);
   SetLine(this->CatheterLine, snapshot.catheter);

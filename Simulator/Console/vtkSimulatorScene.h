@@ -5,6 +5,7 @@
 #ifndef vtkSimulatorScene_h
 #define vtkSimulatorScene_h
 
+#include "AortaMotion.h"
 #include "HeartShell.h"
 #include "Scenario.h"
 #include "TrainingSession.h"
@@ -72,6 +73,7 @@ private:
   void AnchorNormals(WallMotion& wall, vtkPolyData* whole, const std::vector<Vector3>& rest);
   void TurnNormals(const std::vector<Vector3>& points, const std::vector<Vector3>& axis);
   void MakeHeart();
+  void MakeAorta(const WallTopology& topology);
   void MakeInstruments(const Scenario& scenario);
   void MakeTracers();
   void SetStents(const std::vector<StentShape>& stents);
@@ -80,6 +82,8 @@ private:
   std::vector<std::int64_t> Drawn;
   std::vector<AxisNormal> Normals;
   std::vector<Vector3> HeartPoints;
+  std::unique_ptr<const AortaMotion> Aorta; ///< null: none is drawn
+  std::vector<Vector3> AortaPoints;
 
   vtkNew<vtkRenderer> Renderer_;
   vtkNew<vtkPolyData> WallMesh;
@@ -87,6 +91,8 @@ private:
   vtkNew<vtkActor> WallActor;
   vtkNew<vtkPolyData> HeartMesh;
   vtkNew<vtkActor> HeartActor;
+  vtkNew<vtkPolyData> AortaMesh;
+  vtkNew<vtkActor> AortaActor;
   vtkNew<vtkPolyData> WireLine;
   vtkNew<vtkTubeFilter> WireTube;
   vtkNew<vtkActor> WireActor;

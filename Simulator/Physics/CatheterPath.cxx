@@ -32,11 +32,11 @@ Vector3 AlongLine(const std::vector<Vector3>& line, double length)
   }
   return line.back();
 }
+}
 
 Vector3 DirectionAtOstium(const std::vector<Vector3>& axis)
 {
   return (AlongLine(axis, TangentLength) - axis.front()).normalized();
-}
 }
 
 CatheterPath::CatheterPath(const std::vector<Vector3>& axis, const GuideCatheter& catheter,
@@ -52,6 +52,7 @@ CatheterPath::CatheterPath(const std::vector<Vector3>& axis, const GuideCatheter
     throw std::invalid_argument("the axis of the vessel at the catheter has no length");
   }
   this->Behind = static_cast<int>(std::ceil(behind / this->Spacing));
+  this->Begin = -this->Spacing * this->Behind;
   const int inside =
     std::max(1, static_cast<int>(std::floor(std::min(ahead, length) / this->Spacing)));
   this->RestTangent = DirectionAtOstium(axis);
@@ -99,8 +100,6 @@ CatheterPath::CatheterPath(const std::vector<Vector3>& axis, const GuideCatheter
     (i <= this->Behind ? this->Local : this->Further).push_back(place);
   }
   this->Now.resize(this->Behind + 1 + inside);
-  this->Tangents.resize(this->Now.size());
-  this->Sides.resize(this->Now.size());
   this->Shape(axis, this->Now);
   this->Current = this->Now;
   this->Next = this->Now;
@@ -139,32 +138,12 @@ void CatheterPath::Shape(const std::vector<Vector3>& axis, std::vector<Vector3>&
 
 void CatheterPath::Frames()
 {
-  const std::size_t count = this->Now.size();
-  for (std::size_t i = 0; i < count; ++i)
-  {
-    const std::size_t before = i > 0 ? i - 1 : i;
-    const std::size_t after = std::min(i + 1, count - 1);
-    const Vector3 way = this->Now[after] - this->Now[before];
-    const double length = way.norm();
-    this->Tangents[i] = length > 0.0 ? Vector3(way / length)
-      : i > 0                        ? this->Tangents[i - 1]
-                                     : this->RestTangent;
-  }
-  // Parallel transport from behind, where the catheter's shape is rigid.
+  this->MakeTangents(this->RestTangent);
+  // Parallel transport from the ostium, behind which the catheter's shape is rigid.
+  const auto ostium = static_cast<std::size_t>(this->Behind);
   const Eigen::Quaterniond turn =
-    Eigen::Quaterniond::FromTwoVectors(this->RestTangent, this->Tangents[this->Behind]);
-  Vector3 side = turn * this->RestSide;
-  for (int i = this->Behind; i >= 0; --i)
-  {
-    side = (side - this->Tangents[i] * this->Tangents[i].dot(side)).normalized();
-    this->Sides[i] = side;
-  }
-  side = this->Sides[this->Behind];
-  for (std::size_t i = this->Behind + 1; i < count; ++i)
-  {
-    side = (side - this->Tangents[i] * this->Tangents[i].dot(side)).normalized();
-    this->Sides[i] = side;
-  }
+    Eigen::Quaterniond::FromTwoVectors(this->RestTangent, this->Tangents[ostium]);
+  this->CarrySides(ostium, turn * this->RestSide);
 }
 
 void CatheterPath::BeginFrame(const std::vector<Vector3>& axis, double seconds)
@@ -185,46 +164,11 @@ void CatheterPath::SetTime(double seconds)
   this->Frames();
 }
 
-PathPlace CatheterPath::At(double u) const
+Vector3 CatheterPath::VelocityAt(std::size_t i, double share) const
 {
-  const double index =
-    std::clamp(u / this->Spacing + this->Behind, 0.0, static_cast<double>(this->Now.size() - 1));
-  const std::size_t before = std::min(static_cast<std::size_t>(index), this->Now.size() - 2);
-  const double share = index - static_cast<double>(before);
-  PathPlace place;
-  place.position = (1.0 - share) * this->Now[before] + share * this->Now[before + 1];
-  place.tangent =
-    ((1.0 - share) * this->Tangents[before] + share * this->Tangents[before + 1]).normalized();
-  const Vector3 side = (1.0 - share) * this->Sides[before] + share * this->Sides[before + 1];
-  place.side = (side - place.tangent * place.tangent.dot(side)).normalized();
-  place.velocity = ((1.0 - share) * (this->Next[before] - this->Current[before]) +
-                     share * (this->Next[before + 1] - this->Current[before + 1])) /
+  return ((1.0 - share) * (this->Next[i] - this->Current[i]) +
+           share * (this->Next[i + 1] - this->Current[i + 1])) /
     this->Seconds;
-  // Beyond an end it goes straight on.
-  const double beyond = u - std::clamp(u, this->First(), this->Last());
-  place.position += beyond * place.tangent;
-  return place;
-}
-
-double CatheterPath::Nearest(const Vector3& point, double from, double to) const
-{
-  const int last = static_cast<int>(this->Now.size()) - 2;
-  const int first =
-    std::clamp(static_cast<int>(std::floor(from / this->Spacing)) + this->Behind, 0, last);
-  const int end =
-    std::clamp(static_cast<int>(std::floor(to / this->Spacing)) + this->Behind, first, last);
-  double best = std::numeric_limits<double>::infinity();
-  double found = from;
-  for (int i = first; i <= end; ++i)
-  {
-    const SegmentPlace place = NearestOnSegment(point, this->Now[i], this->Now[i + 1]);
-    if (place.squaredDistance < best)
-    {
-      best = place.squaredDistance;
-      found = (i + place.fraction - this->Behind) * this->Spacing;
-    }
-  }
-  return std::clamp(found, from, to);
 }
 
 void CatheterPath::Line(double u, double length, std::vector<Vector3>& line) const

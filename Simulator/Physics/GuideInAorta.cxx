@@ -138,8 +138,8 @@ GuideInAorta::GuideInAorta(
   this->Forward = (way[1] - way[0]).normalized();
   const Vector3 whole = way.back() - way.front();
   const Vector3 across = whole - this->Forward * this->Forward.dot(whole);
-  this->Side = across.norm() > 1e-6 * whole.norm() ? Vector3(across.normalized())
-                                                   : Vector3(this->Forward.unitOrthogonal());
+  this->Side_ = across.norm() > 1e-6 * whole.norm() ? Vector3(across.normalized())
+                                                    : Vector3(this->Forward.unitOrthogonal());
   this->Start = this->Fed = settings.start;
 
   // Frames along the way that do not turn about it, from the entry on.
@@ -192,7 +192,7 @@ Eigen::Quaterniond GuideInAorta::HeldOrientation() const
   Matrix3 frame;
   frame.col(2) = -this->Forward; // from the tip backwards
   frame.col(0) =
-    std::cos(this->Angle) * this->Side + std::sin(this->Angle) * this->Forward.cross(this->Side);
+    std::cos(this->Angle) * this->Side_ + std::sin(this->Angle) * this->Forward.cross(this->Side_);
   frame.col(1) = frame.col(2).cross(frame.col(0));
   return Eigen::Quaterniond(frame);
 }
@@ -245,9 +245,7 @@ const RodStep& GuideInAorta::Step(double position, double angle, ContactSurface&
   const double torque = this->SpringStiffness() * this->Tube.Lag(this->Tube.Size() - 1);
   if (std::isfinite(position) && std::isfinite(angle))
   {
-    const double least = this->Pieces.places[FewestSegments - 1];
-    const double most = this->Pieces.places[this->Pieces.places.size() - 2]; // the last one is held
-    this->Fed = std::clamp(this->Start + position, least, most);
+    this->Fed = std::clamp(this->Start + position, this->Least(), this->Most());
     this->Angle = angle;
   }
   while (this->Fed - this->Pieces.places[this->Tube.Size() - 1] > 0.0 &&
@@ -267,6 +265,16 @@ const RodStep& GuideInAorta::Step(double position, double angle, ContactSurface&
   this->Tube.HangOnSpring(last, this->SpringStiffness(), torque / this->SpringStiffness());
   this->Tube.SetForce(0, this->TipForce);
   return this->Tube.Step(1.0 / this->Settings.tickRate, &wall);
+}
+
+double GuideInAorta::Least() const
+{
+  return this->Pieces.places[FewestSegments - 1];
+}
+
+double GuideInAorta::Most() const
+{
+  return this->Pieces.places[this->Pieces.places.size() - 2]; // the last one is held
 }
 
 double GuideInAorta::Lag() const

@@ -113,6 +113,15 @@ public:
   Vector3 Tip() const { return this->Tube.FirstEnd(0); }
   Vector3 Direction() const { return -this->Tube.Axis(0); } ///< unit, out of its tip
   double Inserted() const { return this->Fed; }             ///< mm beyond the entry
+  ///@{
+  /// mm of it that can be beyond the entry.
+  double Least() const;
+  double Most() const;
+  ///@}
+  const Vector3& Side() const
+  {
+    return this->Side_;
+  }                          ///< unit, across at the entry, where angle 0 is
   double Lag() const;        ///< rad by which its tip is turned less than the hand turned it
   double HandForce() const;  ///< N against advancing, of the last step
   double HandTorque() const; ///< N mm against turning
@@ -130,7 +139,7 @@ private:
   std::vector<RodJoint> Bare; ///< joints without a wire
   Vector3 Entry;
   Vector3 Forward; ///< unit, there
-  Vector3 Side;    ///< unit, across
+  Vector3 Side_;   ///< unit, across
   CosseratRod Tube;
   double Start = 0.0;
   double Fed = 0.0;

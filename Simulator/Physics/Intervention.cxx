@@ -4,8 +4,9 @@
 #include "CatheterPath.h"
 #include "CosseratRod.h"
 #include "CyclicTime.h"
-#include "DisjointSets.h"
 #include "Fnv1a.h"
+#include "GuideFromArch.h"
+#include "OstialTree.h"
 #include "SettingLimits.h"
 #include "VesselWall.h"
 #include "WallMotion.h"
@@ -118,18 +119,22 @@ struct Intervention::Internals : ContactSurface
   int TickInFrame = 0;
   std::size_t RootFirst = 0; // of the axis' points
   std::size_t RootCount = 0;
-  std::int64_t InletTriangle = -1;
   std::vector<Vector3> LastPoints; // of the whole wall at the frame's beginning and end
   std::vector<Vector3> NextPoints;
   std::vector<Vector3> NowPoints;
-  std::vector<std::int64_t>
-    TreePoints; // the points of the engaged tree: no wire comes to another one
+  OstialTree Tree; // the engaged one: no wire comes to another
   std::vector<Vector3> NextTreePoints;
   std::vector<Vector3> Axis;
   std::vector<Vector3> RootAxis;
 
   std::unique_ptr<VesselWall> Wall;
-  std::unique_ptr<CatheterPath> Path;
+  // The guide is one of both: rigid at the ostium, or free in the aorta.
+  std::unique_ptr<CatheterPath> Rigid;
+  std::unique_ptr<GuideFromArch> Free;
+  std::unique_ptr<LengthenedInlet> Inlet; // with the free one
+  GuideWay* Path = nullptr;
+  std::unique_ptr<ArteryLumen> Artery; // with the rigid one
+  InstrumentLumen* Lumen = nullptr;
   std::unique_ptr<CosseratRod> Rod;
 
   // All segments that there can be, from the tip.
@@ -205,7 +210,7 @@ struct Intervention::Internals : ContactSurface
         if (inVessel)
         {
           inVessel = 0;
-          this->Wall->Forget(sample.index);
+          this->Lumen->Forget(sample.index);
         }
         const PathPlace place = this->Path->At(u);
         Vector3 across = sample.centre - place.position;
@@ -232,17 +237,8 @@ struct Intervention::Internals : ContactSurface
         return;
       }
     }
-    if (!inVessel)
-    {
-      inVessel = 1;
-      // What comes out of the catheter is in the vessel that the wire before it is in.
-      const std::int64_t before = sample.index - perSegment;
-      if (before < 0 || !this->InVessel[before] || !this->Wall->PlaceBeside(sample.index, before))
-      {
-        this->Wall->Place(sample.index, this->InletTriangle);
-      }
-    }
-    this->Wall->Find(sample, reach, contacts);
+    inVessel = 1;
+    this->Lumen->Find(sample, reach, contacts);
     if (this->InSleeve(segment))
     {
       this->NoFriction(contacts);
@@ -257,6 +253,14 @@ struct Intervention::Internals : ContactSurface
       contacts.plane[p].stiffness *= Hardening(contacts.plane[p].gap);
     }
   }
+
+  /// mm to be added to u, so that it is counted from the ostium.
+  double FromOstium() const
+  {
+    return this->Free ? this->Report.catheterTip - this->CatheterTip : 0.0;
+  }
+  /// N by which the wire is pushed out of the catheter's tip.
+  double Thrust() const;
 
   /// mm behind the sleeve's tip.
   double BehindSleeve(std::int64_t segment) const
@@ -296,8 +300,9 @@ struct Intervention::Internals : ContactSurface
   }
 
   void MakeSegments();
-  void Engage(const std::vector<Vector3>& points);
-  WallTopology EngagedTree();
+  void Engage(const std::vector<Vector3>& points, std::int64_t samplesPerSegment);
+  void RequireRoom(int root) const;
+  void MakeTreePoints(const Vector3& direction);
   Eigen::Quaterniond HeldOrientation(const PathPlace& place) const;
   double EndAngle() const;
   void AppendSegment();
@@ -358,29 +363,11 @@ void Intervention::Internals::MakeSegments()
   }
 }
 
-void Intervention::Internals::Engage(const std::vector<Vector3>& points)
+void Intervention::Internals::Engage(
+  const std::vector<Vector3>& points, std::int64_t samplesPerSegment)
 {
   const WallTopology& topology = this->Motion->Topology();
-  if (topology.axis.empty())
-  {
-    throw std::invalid_argument("the vessels have no axis, so there is no ostium to engage");
-  }
-  int root = this->Settings.rootBranch;
-  if (root < 0)
-  {
-    for (std::size_t b = 0; b < topology.axis.size() && root < 0; ++b)
-    {
-      if (b >= topology.parent.size() || topology.parent[b] < 0)
-      {
-        root = static_cast<int>(b);
-      }
-    }
-  }
-  if (root < 0 || root >= static_cast<int>(topology.axis.size()))
-  {
-    throw std::invalid_argument(
-      "rootBranch " + std::to_string(root) + " is not a branch of the vessels");
-  }
+  const int root = RootOf(topology, this->Settings.rootBranch);
   for (int b = 0; b < root; ++b)
   {
     this->RootFirst += topology.axis[b].size();
@@ -389,11 +376,48 @@ void Intervention::Internals::Engage(const std::vector<Vector3>& points)
   this->Motion->AxisPositions(this->Phase, this->Axis);
   this->RootAxis.assign(this->Axis.begin() + static_cast<std::ptrdiff_t>(this->RootFirst),
     this->Axis.begin() + static_cast<std::ptrdiff_t>(this->RootFirst + this->RootCount));
-  this->Path = std::make_unique<CatheterPath>(this->RootAxis, this->Catheter,
-    this->Settings.engagement, this->Settings.insideCatheter + 25.0, CatheterReach);
+  const double behind = this->Settings.insideCatheter + 25.0;
+  this->Rigid = std::make_unique<CatheterPath>(
+    this->RootAxis, this->Catheter, this->Settings.engagement, behind, CatheterReach);
+  this->Path = this->Rigid.get();
   this->CatheterTip = std::min(this->Settings.engagement, this->Path->Last());
+  this->RequireRoom(root);
+  this->Tree = MakeOstialTree(
+    topology, points, this->RootAxis.front(), this->Path->At(this->CatheterTip).position);
+  if (this->Settings.guideFromArch && topology.aorta)
+  {
+    GuideSettings guide;
+    guide.tickRate = this->Settings.tickRate;
+    this->Free = std::make_unique<GuideFromArch>(
+      this->Catheter, topology, this->Axis, root, this->Settings.engagement, behind, guide);
+    this->Inlet = std::make_unique<LengthenedInlet>(this->Tree, this->Free->InletLength());
+    this->Path = this->Free.get();
+    this->Rigid.reset();
+    this->CatheterTip = this->Free->TipPlace();
+  }
+  this->MakeTreePoints(DirectionAtOstium(this->RootAxis));
+  VesselWallSettings settings;
+  settings.friction = this->Settings.wallFriction;
+  settings.stiffness = this->Settings.wallStiffness;
+  if (this->Tree.cap > 1)
+  {
+    settings.openCaps.push_back(this->Tree.cap);
+  }
+  this->Wall = std::make_unique<VesselWall>(this->Tree.topology, this->NextTreePoints, settings);
+  if (this->Free)
+  {
+    this->Free->Join(*this->Wall, this->Tree.inlet);
+    this->Lumen = &this->Free->Lumen();
+    return;
+  }
+  this->Artery = std::make_unique<ArteryLumen>(*this->Wall, this->Tree.inlet, samplesPerSegment);
+  this->Lumen = this->Artery.get();
+}
 
-  // Do the instruments fit?
+/// @throws std::invalid_argument  an instrument does not fit where it is at the beginning
+void Intervention::Internals::RequireRoom(int root) const
+{
+  const WallTopology& topology = this->Motion->Topology();
   double narrowest = std::numeric_limits<double>::infinity();
   double along = 0.0;
   const std::vector<Vector3>& axis = topology.axis[root];
@@ -429,95 +453,20 @@ void Intervention::Internals::Engage(const std::vector<Vector3>& points)
         "the inside of the catheter '" + this->Catheter.name + "'", this->Catheter.innerRadius);
     }
   }
-
-  // The cap through which the catheter comes in.
-  const Vector3 ostium = this->RootAxis.front();
-  const Vector3 tip = this->Path->At(this->CatheterTip).position;
-  double nearestCap = std::numeric_limits<double>::infinity();
-  double nearestWall = std::numeric_limits<double>::infinity();
-  int inlet = 0;
-  for (std::size_t t = 0; t < topology.triangles.size(); ++t)
-  {
-    const Triangle& corners = topology.triangles[t];
-    const Vector3 middle = (points[corners[0]] + points[corners[1]] + points[corners[2]]) / 3.0;
-    const bool cap = !topology.entity.empty() && topology.entity[t] > 1;
-    if (cap && (middle - ostium).squaredNorm() < nearestCap)
-    {
-      nearestCap = (middle - ostium).squaredNorm();
-      inlet = topology.entity[t];
-    }
-    if (!cap && (middle - tip).squaredNorm() < nearestWall)
-    {
-      nearestWall = (middle - tip).squaredNorm();
-      this->InletTriangle = static_cast<std::int64_t>(t);
-    }
-  }
-  if (this->InletTriangle < 0)
-  {
-    throw std::invalid_argument("the vessels have no wall, only caps");
-  }
-  const WallTopology tree = this->EngagedTree();
-  this->NextTreePoints.clear();
-  for (const std::int64_t point : this->TreePoints)
-  {
-    this->NextTreePoints.push_back(points[point]);
-  }
-  VesselWallSettings settings;
-  settings.friction = this->Settings.wallFriction;
-  settings.stiffness = this->Settings.wallStiffness;
-  if (inlet > 1)
-  {
-    settings.openCaps.push_back(inlet);
-  }
-  this->Wall = std::make_unique<VesselWall>(tree, this->NextTreePoints, settings);
 }
 
-WallTopology Intervention::Internals::EngagedTree()
+/// Of the engaged tree, out of the whole wall's that come next.
+void Intervention::Internals::MakeTreePoints(const Vector3& direction)
 {
-  // What is connected with the place where the catheter's tip is.
-  const WallTopology& topology = this->Motion->Topology();
-  const auto points = static_cast<std::int64_t>(topology.points);
-  DisjointSets trees(topology.points);
-  for (const Triangle& corners : topology.triangles)
+  this->NextTreePoints.resize(this->Tree.points.size());
+  for (std::size_t i = 0; i < this->Tree.points.size(); ++i)
   {
-    trees.Join(corners[0], corners[1]);
-    trees.Join(corners[0], corners[2]);
+    this->NextTreePoints[i] = this->NextPoints[this->Tree.points[i]];
   }
-  const std::int64_t wanted = trees.Find(topology.triangles[this->InletTriangle][0]);
-  std::vector<std::int64_t> place(topology.points, -1);
-  WallTopology tree;
-  for (std::int64_t i = 0; i < points; ++i)
+  if (this->Inlet)
   {
-    if (trees.Find(i) == wanted)
-    {
-      place[i] = tree.points++;
-      this->TreePoints.push_back(i);
-      if (!topology.group.empty())
-      {
-        tree.group.push_back(topology.group[i]);
-      }
-    }
+    this->Inlet->Lengthen(this->NextTreePoints, direction);
   }
-  std::int64_t inlet = -1;
-  for (std::size_t t = 0; t < topology.triangles.size(); ++t)
-  {
-    const Triangle& corners = topology.triangles[t];
-    if (place[corners[0]] < 0)
-    {
-      continue;
-    }
-    if (static_cast<std::int64_t>(t) == this->InletTriangle)
-    {
-      inlet = static_cast<std::int64_t>(tree.triangles.size());
-    }
-    tree.triangles.push_back({ place[corners[0]], place[corners[1]], place[corners[2]] });
-    if (!topology.entity.empty())
-    {
-      tree.entity.push_back(topology.entity[t]);
-    }
-  }
-  this->InletTriangle = inlet;
-  return tree;
 }
 
 Eigen::Quaterniond Intervention::Internals::HeldOrientation(const PathPlace& place) const
@@ -570,16 +519,23 @@ void Intervention::Internals::BeginFrame()
     this->Motion->AxisPositions(next, this->Axis);
     this->Opening->Deform(this->Axis, this->NextPoints);
   }
-  for (std::size_t i = 0; i < this->TreePoints.size(); ++i)
+  else
   {
-    this->NextTreePoints[i] = this->NextPoints[this->TreePoints[i]];
+    this->Motion->AxisPositions(next, this->Axis);
   }
-  this->Wall->BeginFrame(this->NextTreePoints, this->FrameSeconds);
-  this->Motion->AxisPositions(next, this->Axis);
   std::copy_n(this->Axis.begin() + static_cast<std::ptrdiff_t>(this->RootFirst), this->RootCount,
     this->RootAxis.begin());
-  this->Path->SetAngle(this->CatheterAngle);
-  this->Path->BeginFrame(this->RootAxis, this->FrameSeconds);
+  this->MakeTreePoints(DirectionAtOstium(this->RootAxis));
+  this->Wall->BeginFrame(this->NextTreePoints, this->FrameSeconds);
+  if (this->Free)
+  {
+    this->Free->BeginFrame(this->Axis, this->FrameSeconds);
+  }
+  else
+  {
+    this->Rigid->SetAngle(this->CatheterAngle);
+    this->Rigid->BeginFrame(this->RootAxis, this->FrameSeconds);
+  }
   this->TickInFrame = 0;
 }
 
@@ -594,7 +550,7 @@ double Intervention::Internals::SleevePlace() const
   const double middle = this->Sleeve->Tip() - this->Sleeve->Device().Middle();
   if (middle <= this->CatheterTip)
   {
-    return middle;
+    return middle + this->FromOstium();
   }
   const double behind = this->Fed - middle; // mm of the wire
   std::int64_t i = 0;
@@ -626,8 +582,8 @@ void Intervention::Internals::OpenWall()
     this->SleeveWayBranch = this->Report.branch;
     this->SleeveWay = WayThrough(this->Motion->Topology(), this->SleeveWayBranch);
   }
-  this->Sleeve->Inflate(this->FrameSeconds, this->Inflator, this->SleevePlace(), this->CatheterTip,
-    this->SleeveWay, *this->Opening);
+  this->Sleeve->Inflate(this->FrameSeconds, this->Inflator, this->SleevePlace(),
+    this->CatheterTip + this->FromOstium(), this->SleeveWay, *this->Opening);
   if (std::optional<PlacedStent> placed = this->Sleeve->TakePlaced())
   {
     this->Stents.push_back(std::move(*placed));
@@ -702,14 +658,36 @@ void Intervention::Internals::Drive(const DriveInput& input)
   // The catheter is moved by a hand, too: slowly.
   const double mostTip = 50.0 * this->Step;
   const double wanted = this->Settings.engagement + input.catheterPosition;
-  const double allowed = std::clamp(wanted, 0.5, this->Path->Last());
+  const double least = this->Free ? this->Settings.engagement + this->Free->Least() : 0.5;
+  const double greatest =
+    this->Free ? this->Settings.engagement + this->Free->Most() : this->Path->Last();
+  const double allowed = std::clamp(wanted, least, greatest);
   if (wanted != allowed)
   {
     this->Say(Notice::CatheterLimit);
   }
-  this->CatheterTip += std::clamp(allowed - this->CatheterTip, -mostTip, mostTip);
+  const double moved = std::clamp(allowed - this->CatheterTip, -mostTip, mostTip);
+  this->CatheterTip += moved;
+  // A guide that is brought to the ostium takes the wire along: the valve at its end holds it.
+  this->Fed += this->Free ? moved : 0.0;
   this->CatheterAngle +=
     std::clamp(input.catheterAngle - this->CatheterAngle, -2.0 * this->Step, 2.0 * this->Step);
+  if (this->Free)
+  {
+    this->Free->Step(this->CatheterTip - this->Settings.engagement, this->CatheterAngle, this->Wire,
+      this->Fed - this->CatheterTip, this->Thrust());
+  }
+}
+
+double Intervention::Internals::Thrust() const
+{
+  // Of the joint next to the tip, along it.
+  std::int64_t i = 0;
+  while (i + 2 < this->Rod->Size() && this->Places[i + 1] < this->Fed - this->CatheterTip)
+  {
+    ++i;
+  }
+  return -this->Rod->JointForce(i).dot(this->Rod->Axis(i));
 }
 
 void Intervention::Internals::Feed()
@@ -774,14 +752,14 @@ void Intervention::Internals::PutBack()
     sample.centre = this->Rod->SamplePoint(i, contact.sample);
     sample.radius = radius;
     WallPlace place;
-    if (this->Wall->Outside(sample, place))
+    Vector3 velocity = Vector3::Zero();
+    if (this->Lumen->Outside(sample, place, velocity))
     {
       const Vector3 inward = place.point - sample.centre;
       const double distance = inward.norm();
       const Vector3 move = distance > 1e-9
         ? Vector3(inward * ((distance + 0.5 * radius) / distance))
         : Vector3::Zero();
-      const Vector3 velocity = this->Wall->Velocity(place);
       this->Rod->Place(i, this->Rod->Position(i) + move, this->Rod->Orientation(i));
       this->Rod->SetVelocity(i, velocity, Vector3::Zero());
       ++this->Report.outside;
@@ -835,6 +813,13 @@ void Intervention::Internals::Measure()
   report.phase = Modulo(this->Phase);
   report.inserted = std::max(0.0, this->Fed - this->CatheterTip);
   report.catheterTip = this->CatheterTip;
+  if (this->Free)
+  {
+    report.seat = this->Free->Seat();
+    report.catheterTip = report.seat.engaged
+      ? std::max(0.0, report.seat.depth + this->Free->MouthPlace())
+      : -(this->Path->At(this->CatheterTip).position - this->Free->Mouth().position).norm();
+  }
   report.jointGap = step.maximumGap;
   report.tipForce = 0.0;
   report.maximumForce = 0.0;
@@ -890,7 +875,7 @@ void Intervention::Internals::Measure()
     tip.index = this->Rod->SamplesPerSegment() - 1;
     tip.centre = this->Rod->FirstEnd(0);
     tip.radius = this->Segments[0].radius;
-    report.branch = this->InVessel[tip.index] ? this->Wall->BranchAt(tip) : -1;
+    report.branch = this->InVessel[tip.index] ? this->Lumen->BranchAt(tip) : -1;
   }
 }
 
@@ -918,13 +903,13 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   data.MakeSegments();
   data.Motion->Positions(data.Phase, data.NextPoints);
   data.LastPoints = data.NextPoints;
-  data.Engage(data.NextPoints);
   RodSettings rod;
   rod.mediumFollowsWalls = true;
   rod.reach = 0.08; // a little less than `trust`: what comes nearer is seen in the next tick
   rod.maximumMove = 1.0;
   rod.trust = 0.1;
   data.Rod = std::make_unique<CosseratRod>(settings.capacity, rod);
+  data.Engage(data.NextPoints, data.Rod->SamplesPerSegment());
   data.InVessel.assign(settings.capacity * data.Rod->SamplesPerSegment(), 0);
   data.Line.reserve(settings.capacity + 1);
   data.Last.position.reserve(settings.capacity);
@@ -1082,7 +1067,29 @@ std::uint64_t Intervention::StateHash() const
     hash = Fnv1a(&value, sizeof(value), hash);
   }
   hash = data.Behind.Hash(hash);
+  hash = data.Free ? data.Free->Hash(hash) : hash;
   return data.Sleeve ? data.Opening->Hash(data.Sleeve->Hash(hash)) : hash;
+}
+
+const GuideCatheter& Intervention::Catheter() const
+{
+  return this->Data->Catheter;
+}
+
+std::pair<std::int64_t, std::int64_t> Intervention::GuideCovers() const
+{
+  const Internals& data = *this->Data;
+  std::int64_t count = 0;
+  if (data.Free && data.Report.seat.engaged)
+  {
+    double along = 0.0;
+    for (std::size_t i = 0; i < data.RootCount && along <= data.Report.catheterTip; ++i)
+    {
+      ++count;
+      along += i + 1 < data.RootCount ? (data.RootAxis[i + 1] - data.RootAxis[i]).norm() : 0.0;
+    }
+  }
+  return { static_cast<std::int64_t>(data.RootFirst), count };
 }
 
 const BalloonOnWire* Intervention::Balloon() const

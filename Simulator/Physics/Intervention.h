@@ -8,12 +8,14 @@
 #include "BalloonOnWire.h"
 #include "DriveInput.h"
 #include "Geometry.h"
+#include "GuideInAorta.h"
 #include "Instrument.h"
 
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace coronary
@@ -31,8 +33,11 @@ struct InterventionSettings
   double insideCatheter = 12.0; ///< mm of the wire that are simulated inside the catheter
   int rootBranch = -1;          ///< branch whose ostium is engaged; -1: as the artery says
   double engagement = 3.0;      ///< mm from the ostium to the catheter's tip along the vessel
-  double wallFriction = 1.0;    ///< factor on the wire's friction against the wall, 0 to 10
-  double wallStiffness = 60.0;  ///< N/mm of a sample's contact; harder where the bare wire is deep
+  /// Where there is an aorta, the catheter is elastic, lies in it at the beginning and has to be brought to the ostium; else it is
+  /// rigid there.
+  bool guideFromArch = false;
+  double wallFriction = 1.0;   ///< factor on the wire's friction against the wall, 0 to 10
+  double wallStiffness = 60.0; ///< N/mm of a sample's contact; harder where the bare wire is deep
   /// Pa s: per length, across and along the wire, against blood that moves with the walls. Blood's own is about
   /// 0.025; a hundred times that calms the jumps of the light tip, and is still nothing against friction.
   double drag = 2.5;
@@ -47,9 +52,11 @@ struct InterventionSettings
 struct TickReport
 {
   std::uint64_t tick = 0;
-  double phase = 0.0;              ///< fraction of the R-R interval, 0 to 1
-  double inserted = 0.0;           ///< mm of the wire beyond the catheter's tip
-  double catheterTip = 0.0;        ///< mm of the catheter beyond the ostium; negative: in the aorta
+  double phase = 0.0;    ///< fraction of the R-R interval, 0 to 1
+  double inserted = 0.0; ///< mm of the wire beyond the catheter's tip
+  double catheterTip =
+    0.0;          ///< mm of the catheter beyond the ostium; negative: in the aorta, so far from it
+  GuideSeat seat; ///< of a catheter from the arch
   double proximalForce = 0.0;      ///< N, against advancing
   double proximalTorque = 0.0;     ///< N mm, against turning
   double tipForce = 0.0;           ///< N between the wire's last 3 mm and the wall
@@ -109,6 +116,10 @@ public:
   /// Some of its points now. @param which  numbers of points, in range
   void SomeWallPoints(
     const std::vector<std::int64_t>& which, std::vector<Vector3>& positions) const;
+
+  const GuideCatheter& Catheter() const;
+  /// Points of the axes, in one list, that a catheter from the arch is around now: the first one, and how many.
+  std::pair<std::int64_t, std::int64_t> GuideCovers() const;
 
   /// Null: there is no balloon in this session.
   const BalloonOnWire* Balloon() const;

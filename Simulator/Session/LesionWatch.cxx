@@ -51,6 +51,8 @@ LesionWatch::LesionWatch(const WallTopology& topology, const ContrastModel& medi
   for (std::size_t b = 0; b < topology.axis.size(); ++b)
   {
     this->First.push_back(FirstAxisPoint(topology, static_cast<int>(b)));
+    this->Resting.insert(
+      this->Resting.end(), topology.axisRadius[b].begin(), topology.axisRadius[b].end());
   }
   for (FoundLesion& lesion : FindLesions(topology))
   {
@@ -96,17 +98,27 @@ int LesionWatch::BranchOf(std::int64_t point) const
 void LesionWatch::StepFlow(double seconds, const Intervention& instruments, ContrastModel& medium)
 {
   this->FlowIsNew_ = false;
-  if (const DilatableWall* wall = instruments.Dilated())
+  const DilatableWall* wall = instruments.Dilated();
+  const auto [guideFirst, guideCount] = instruments.GuideCovers();
+  if (wall || guideCount > 0 || !this->Filled_.empty())
   {
-    std::vector<double> filled(wall->Radii().size(), 0.0);
-    for (const auto& [point, radius] : instruments.Balloon()->Sections())
+    const std::vector<double>& lumen = wall ? wall->Radii() : this->Resting;
+    std::vector<double> filled(lumen.size(), 0.0);
+    if (wall)
     {
-      filled[point] = radius;
+      for (const auto& [point, radius] : instruments.Balloon()->Sections())
+      {
+        filled[point] = radius;
+      }
     }
-    if (filled != this->Filled_ || wall->Radii() != this->Lumen_)
+    for (std::int64_t point = guideFirst; point < guideFirst + guideCount; ++point)
+    {
+      filled[point] = std::max(filled[point], instruments.Catheter().outerRadius);
+    }
+    if (filled != this->Filled_ || lumen != this->Lumen_)
     {
       this->Filled_ = std::move(filled);
-      this->Lumen_ = wall->Radii();
+      this->Lumen_ = lumen;
       medium.SetLumen(this->Lumen_, this->Filled_);
       this->ReserveIsOld = true;
       this->ChangesFor += seconds;

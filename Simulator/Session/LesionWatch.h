@@ -84,7 +84,10 @@ public:
   ///@{
   /// mm, per point of the axes in one list; empty without a balloon.
   const std::vector<double>& Lumen() const { return this->Lumen_; }
-  const std::vector<double>& Filled() const { return this->Filled_; } ///< by the balloon catheter
+  const std::vector<double>& Filled() const
+  {
+    return this->Filled_;
+  } ///< by balloon and guide catheter
   ///@}
 
 private:
@@ -126,6 +129,8 @@ private:
   std::vector<std::int64_t> First;            ///< point of each branch
   std::vector<std::vector<double>> Reference; ///< mm, radii
   std::vector<std::string> Names;             ///< of branches
+  std::vector<double>
+    Resting; ///< mm, per point of the axes in one list: of the lumen without a balloon
   std::vector<double> Lumen_;
   std::vector<double> Filled_;
   std::vector<ProcedureEvent> Events_;

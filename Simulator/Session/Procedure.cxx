@@ -132,6 +132,8 @@ bool ProcedureWatch::Reached(const ProcedureMoment& moment,
   {
     case Goal::Angiogram:
       return this->SeesView(moment, step.value);
+    case Goal::GuideIn:
+      return report.catheterTip >= 0.0;
     case Goal::WireIn:
       for (int branch = report.branch; branch >= 0;
            branch = this->Parent[static_cast<std::size_t>(branch)])

@@ -41,7 +41,8 @@ constexpr GoalName GoalNames[] = { { ProcedureStep::Goal::Angiogram, "angiogram"
   { ProcedureStep::Goal::StentInLesion, "stent_in_lesion", nullptr, 0.0, 0.0 },
   { ProcedureStep::Goal::StenosisBelow, "stenosis_below", "percent", 1.0, 100.0 },
   { ProcedureStep::Goal::ReserveAbove, "ffr_above", "ffr", 0.0, 1.0 },
-  { ProcedureStep::Goal::WireBack, "wire_back", nullptr, 0.0, 0.0 } };
+  { ProcedureStep::Goal::WireBack, "wire_back", nullptr, 0.0, 0.0 },
+  { ProcedureStep::Goal::GuideIn, "guide_in_ostium", nullptr, 0.0, 0.0 } };
 
 /// A number of the file, its range, and where it goes; one list for reading and writing.
 struct NumberEntry
@@ -298,6 +299,7 @@ InterventionSettings SettingsOf(const Json& object, const std::string& where)
   settings.capacity = static_cast<int>(fields.Whole("capacity", 20, 1000, settings.capacity));
   settings.rootBranch =
     static_cast<int>(fields.Whole("root_branch", -1, 100000, settings.rootBranch));
+  settings.guideFromArch = fields.Flag("guide_from_arch", false);
   fields.Done();
   try
   {
@@ -317,6 +319,10 @@ Json SettingsToJson(const InterventionSettings& given)
   json["ticks_per_frame"] = settings.ticksPerFrame;
   json["capacity"] = settings.capacity;
   json["root_branch"] = settings.rootBranch;
+  if (settings.guideFromArch)
+  {
+    json["guide_from_arch"] = true;
+  }
   return json;
 }
 
@@ -454,7 +460,8 @@ ProcedureStep StepOf(const Json& object, const std::string& where)
   }
   step.goal = goal->goal;
   step.vessel = step.goal == ProcedureStep::Goal::WireIn ? fields.Text("vessel")
-    : step.goal == ProcedureStep::Goal::Angiogram || step.goal == ProcedureStep::Goal::WireBack
+    : step.goal == ProcedureStep::Goal::Angiogram || step.goal == ProcedureStep::Goal::WireBack ||
+      step.goal == ProcedureStep::Goal::GuideIn
     ? ""
     : fields.Text("vessel", "");
   if (goal->value)

@@ -46,6 +46,7 @@ struct ProcedureStep
   enum class Goal
   {
     Angiogram, ///< value: cine runs with contrast medium, from views at least 25 degrees apart
+    GuideIn,   ///< the guide catheter's tip is in the ostium
     WireIn,    ///< the wire's tip is in `vessel`, or behind it
     WireBeyondLesion, ///< value: mm of wire behind the lesion
     BalloonInLesion,  ///< value: atm of a balloon whose middle is in the lesion

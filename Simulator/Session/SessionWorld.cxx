@@ -65,6 +65,12 @@ SessionWorld LoadWorld(const Scenario& scenario, bool background, const WorldPro
   world.wallHash = WallHash(*world.wall);
   const WallTopology& topology = world.wall->Topology();
   world.scenario.imaging.pose = StartPose(topology, scenario.imaging);
+  if (scenario.settings.guideFromArch && !topology.aorta)
+  {
+    notes.emplace_back(
+      "The vessels have no aorta (of a run: aorta_wall.vtp): the guide catheter is "
+      "rigid in the ostium.");
+  }
   if (background && !world.background)
   {
     loadPatient(withThorax, topology);

@@ -2,6 +2,7 @@
 
 #include "Fnv1a.h"
 #include "HandAxes.h"
+#include "Numbers.h"
 
 #include <algorithm>
 #include <array>
@@ -23,6 +24,20 @@ constexpr double FurthestTable = 500.0;     // mm
 constexpr double MinimumField = 80.0;       // mm
 constexpr double MaximumField = 400.0;      // mm
 
+constexpr double PlacedFor = 0.3; // s that a guide has to lie so, to be told
+
+enum class GuidePlace : int
+{
+  Aorta,
+  Ostium,
+  Deep
+};
+
+GuidePlace PlaceOf(const GuideSeat& seat)
+{
+  return seat.Deep() ? GuidePlace::Deep : seat.engaged ? GuidePlace::Ostium : GuidePlace::Aorta;
+}
+
 double Limited(double value, double low, double high, double otherwise)
 {
   return std::isfinite(value) ? std::clamp(value, low, high) : otherwise;
@@ -31,6 +46,7 @@ double Limited(double value, double low, double high, double otherwise)
 InterventionSettings WithRoot(const WallMotion& wall, const Scenario& scenario)
 {
   InterventionSettings settings = scenario.settings;
+  settings.guideFromArch = settings.guideFromArch && wall.Topology().aorta;
   if (settings.rootBranch < 0)
   {
     settings.rootBranch = RootBranch(wall.Topology(), scenario.artery);
@@ -68,6 +84,7 @@ struct TrainingSession::Internals
   {
     this->Pose = scenario.imaging.pose;
     this->SetField();
+    this->Artery = scenario.artery == "any" ? "artery" : scenario.artery;
     this->Steps = scenario.procedure;
     this->Procedure.emplace(this->Steps, this->Wall->Topology(),
       this->Watch.Results(this->Physics, this->Medium), scenario.balloon.has_value());
@@ -85,6 +102,15 @@ struct TrainingSession::Internals
   void Measure(const SessionInput& input);
   void MeasureHands(const SessionInput& input);
   void StepProcedure();
+  void TellOfGuide();
+  /// mmHg at the guide's tip.
+  double TipPressure() const
+  {
+    const TickReport& tick = this->Report.tick;
+    return tick.seat.engaged
+      ? this->Medium.FlowModel().PressureAt({ this->Settings.rootBranch, tick.catheterTip })
+      : this->Medium.AorticPressure();
+  }
   bool Exchange(double number);
 
   std::shared_ptr<WallMotion> Wall;
@@ -97,6 +123,13 @@ struct TrainingSession::Internals
   std::vector<ProcedureStep> Steps;
   std::optional<ProcedureWatch> Procedure;
   double LastMoved = 0.0; // s
+  std::string Artery;
+  ///@{
+  /// Of a guide from the arch: how it was told to lie, how it lies, and since when, s.
+  GuidePlace ToldPlace = GuidePlace::Aorta;
+  GuidePlace LastPlace = GuidePlace::Aorta;
+  double PlacedSince = 0.0;
+  ///@}
   std::vector<BalloonCatheter> Balloons;
   std::size_t BalloonNumber = 0;
   ExposureClock Clock;
@@ -227,10 +260,47 @@ void TrainingSession::Internals::Measure(const SessionInput& input)
   {
     metrics.events = this->Watch.Events();
   }
+  if (this->Settings.guideFromArch && this->Tick % this->TicksOfProcedure == 0)
+  {
+    this->TellOfGuide();
+  }
   if (!this->Procedure->Done() && this->Tick % this->TicksOfProcedure == 0)
   {
     this->StepProcedure();
   }
+}
+
+void TrainingSession::Internals::TellOfGuide()
+{
+  const GuideSeat& seat = this->Report.tick.seat;
+  const GuidePlace place = PlaceOf(seat);
+  const double now = this->Metrics.procedureSeconds;
+  this->PlacedSince = place == this->LastPlace ? this->PlacedSince : now;
+  this->LastPlace = place;
+  if (place == this->ToldPlace || now - this->PlacedSince < PlacedFor)
+  {
+    return;
+  }
+  this->ToldPlace = place;
+  char text[160];
+  switch (place)
+  {
+    case GuidePlace::Aorta:
+      std::snprintf(text, sizeof(text), "The guide catheter has left the ostium of the %s.",
+        this->Artery.c_str());
+      break;
+    case GuidePlace::Ostium:
+      std::snprintf(text, sizeof(text),
+        "The guide catheter is in the ostium of the %s: %.1f mm deep, %.0f degrees off its axis%s.",
+        this->Artery.c_str(), seat.depth, seat.angle / Degree,
+        seat.Coaxial() ? "" : ", not coaxial");
+      break;
+    case GuidePlace::Deep:
+      std::snprintf(text, sizeof(text), "The guide catheter is deep in the %s: %.1f mm.",
+        this->Artery.c_str(), seat.depth);
+      break;
+  }
+  this->Messages.emplace_back(text);
 }
 
 void TrainingSession::Internals::MeasureHands(const SessionInput& input)
@@ -487,7 +557,7 @@ void TrainingSession::SnapshotOfImage(SessionSnapshot& snapshot) const
   snapshot.procedure = data.Procedure->State();
   snapshot.contrast = data.Medium.Balance();
   snapshot.injection = data.Report.injection;
-  snapshot.aorticPressure = data.Medium.AorticPressure();
+  snapshot.tipPressure = data.TipPressure();
   snapshot.input = data.Last;
   snapshot.pose = data.Pose;
   snapshot.fieldOfView = data.Field;
@@ -496,6 +566,7 @@ void TrainingSession::SnapshotOfImage(SessionSnapshot& snapshot) const
   snapshot.exposure = data.Clock.Last();
   snapshot.wire = data.Physics.Centerline();
   snapshot.catheter = data.Physics.CatheterLine();
+  snapshot.guideFromArch = data.Settings.guideFromArch;
   data.Wall->AxisPositions(data.Report.tick.phase, snapshot.axis);
   snapshot.concentration = data.Medium.Concentration();
   snapshot.blush = data.Medium.BlushVolume();

@@ -40,8 +40,9 @@ struct SessionSnapshot
   TickReport report;
   SessionMetrics metrics;
   ContrastBalance contrast;
-  double injection = 0.0;      ///< mL/s
-  double aorticPressure = 0.0; ///< mmHg
+  double injection = 0.0; ///< mL/s
+  double tipPressure =
+    0.0; ///< mmHg, of the guide's tip: the aortic one, damped where it fills a vessel
   SessionInput input;
   CArmPose pose;
   double fieldOfView = 0.0; ///< mm
@@ -50,6 +51,7 @@ struct SessionSnapshot
   Exposure exposure;                 ///< the last one
   std::vector<Vector3> wire;         ///< from its tip, mm
   std::vector<Vector3> catheter;     ///< from its tip, mm
+  bool guideFromArch = false;        ///< it lies in the aorta, which is to be seen
   std::vector<Vector3> axis;         ///< as WallMotion::AxisPositions
   std::vector<double> concentration; ///< as ContrastModel::Concentration
   std::vector<double> blush;         ///< per branch, mL

@@ -32,6 +32,7 @@ struct VesselModel
 /**
  * Of a run: the boundary of its tetrahedra (volume_boundary.vtp), else its surface.vtp; its tree (centerline.vtp) as axis, a
  * line a branch; for a tracked motion skeleton.vtp, weights.vtu and the poses that motion/skeleton.vtp.series lists.
+ * The aorta is a run's aorta_wall.vtp with its aorta_centerline.vtp, or the phantom's own, completed; a surface has none.
  * Points belong to the branch that the boundary's GroupIds name, or that is nearest to them in its radii.
  *
  * While it runs, what VTK reports in this process is taken here.

@@ -27,7 +27,7 @@ struct VesselWallSettings
   /// Entities (2..) that are no obstacle: what leaves the lumen through them is free.
   std::vector<int> openCaps;
   /// mm along the wall from the place that a sample is nearest to: what is further is another vessel for
-  /// it. Has to be half the circumference of the widest lumen at least; 1 to 100.
+  /// it. Has to be half the circumference of the widest lumen at least; 1 to 100. 0: all of the wall is one vessel.
   double surfaceReach = 8.0;
   /// mm that a sample may move against the wall before its triangles are looked up again, 0.01 to 5.
   double margin = 0.3;

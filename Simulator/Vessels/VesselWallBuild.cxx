@@ -156,8 +156,8 @@ void VesselWallSettings::Validate() const
   };
   require(friction >= 0.0 && friction <= 10.0, "friction", friction, "0 to 10");
   require(stiffness > 0.0 && std::isfinite(stiffness), "stiffness", stiffness, "positive");
-  require(
-    surfaceReach >= 1.0 && surfaceReach <= 100.0, "surfaceReach", surfaceReach, "1 to 100 mm");
+  require(surfaceReach == 0.0 || (surfaceReach >= 1.0 && surfaceReach <= 100.0), "surfaceReach",
+    surfaceReach, "0, or 1 to 100 mm");
   require(margin >= 0.01 && margin <= 5.0, "margin", margin, "0.01 to 5 mm");
   require(blend >= 0.0 && blend <= 5.0, "blend", blend, "0 to 5 mm");
 }
@@ -288,6 +288,16 @@ void VesselWall::Internals::Build(const WallTopology& topology, const std::vecto
 void VesselWall::Internals::BuildPatches()
 {
   const std::size_t count = this->Triangles.size();
+  if (this->Settings.surfaceReach == 0.0)
+  {
+    for (WallCorners& triangle : this->Triangles)
+    {
+      triangle.patch = 0;
+    }
+    this->Near = { { 0 } };
+    this->Marked.assign(1, 0u);
+    return;
+  }
   const auto centreOf = [&](std::int32_t i)
   {
     const std::array<std::int32_t, 3>& v = this->Triangles[i].vertex;

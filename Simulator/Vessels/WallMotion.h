@@ -8,11 +8,20 @@
 #include "Geometry.h"
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 namespace coronary
 {
+/// The aorta, where it is known.
+struct AortaAtRest
+{
+  std::vector<Vector3> points;     ///< mm, of its wall
+  std::vector<Triangle> triangles; ///< closed, outwards
+  std::vector<Vector3> axis;       ///< mm, from the valve to the diaphragm
+};
+
 /// What does not move: how the wall's points are connected, and where they belong.
 struct WallTopology
 {
@@ -29,6 +38,7 @@ struct WallTopology
   std::vector<std::vector<double>> axisReference;
   /// Degrees of the section that calcium takes, as axis; empty: none.
   std::vector<std::vector<double>> axisCalcium;
+  std::shared_ptr<const AortaAtRest> aorta; ///< null: not known
 };
 
 /// Positions of the wall's points over the cycle. Periodic; any real phase is taken modulo 1.

@@ -290,6 +290,32 @@ std::map<int, int> BranchesByGroup(const PhantomTree& tree)
 }
 }
 
+AortaAtRest PhantomAorta(const CoronaryPhantom& phantom)
+{
+  constexpr double time = 0.0;
+  constexpr double ValveBelow = 14.0; // mm, where its sections begin
+  std::vector<AorticRing> rings = phantom.Aorta(time);
+  double length = 0.0;
+  std::size_t count = 0;
+  for (AorticRing& ring : rings)
+  {
+    ring.centre = phantom.ReferencePosition(ring.centre, time);
+    length += count > 0 ? (ring.centre - rings[count - 1].centre).norm() : 0.0;
+    if (length > ValveBelow + PhantomAortaSeen)
+    {
+      break;
+    }
+    ++count;
+    for (Vector3& point : ring.rim)
+    {
+      point = phantom.ReferencePosition(point, time);
+    }
+  }
+  rings.resize(count);
+  AorticModel model = ModelAorta(rings);
+  return { std::move(model.points), std::move(model.triangles), std::move(model.axis) };
+}
+
 WallTopology PhantomAxes(const CoronaryPhantom& phantom)
 {
   WallTopology topology;
@@ -334,6 +360,7 @@ std::shared_ptr<WallMotion> MakePhantomWallMotion(
   used.surfaceSpacing = edgeLength;
   const CoronaryPhantom phantom(used);
   WallTopology topology = PhantomAxes(phantom);
+  topology.aorta = std::make_shared<AortaAtRest>(PhantomAorta(phantom));
   const std::map<int, int> branchOf = BranchesByGroup(phantom.Tree(0.0));
   std::vector<double> times;
   std::vector<std::vector<Vector3>> positions;

@@ -512,6 +512,31 @@ void TakeCalcium(const std::string& folder, WallTopology& topology)
   }
 }
 
+/// The run's aorta; null: it found none.
+std::shared_ptr<const AortaAtRest> AortaOfRun(const std::string& folder, vtkMessageTrap& messages)
+{
+  const std::string wallPath = (fs::path(folder) / "aorta_wall.vtp").string();
+  const std::string linePath = (fs::path(folder) / "aorta_centerline.vtp").string();
+  if (!IsFile(wallPath) || !IsFile(linePath))
+  {
+    return nullptr;
+  }
+  auto aorta = std::make_shared<AortaAtRest>();
+  Boundary wall = BoundaryOf(ReadPolyData(wallPath, messages), wallPath);
+  aorta->points = std::move(wall.points);
+  aorta->triangles = std::move(wall.triangles);
+  const auto line = ReadPolyData(linePath, messages);
+  for (vtkIdType n = 0; n < line->GetNumberOfPoints(); ++n)
+  {
+    aorta->axis.emplace_back(line->GetPoint(n));
+  }
+  if (aorta->axis.size() < 2)
+  {
+    Fail(linePath, "is no line from the valve to the diaphragm: it has less than two points");
+  }
+  return aorta;
+}
+
 VesselModel LoadRun(
   const VesselSource& source, vtkMessageTrap& messages, const ProgressCallback& progress)
 {
@@ -531,6 +556,7 @@ VesselModel LoadRun(
   RestingWall wall =
     ReadWall(surface, FileOfRun(source.path, "centerline.vtp", "centerline"), messages, progress);
   TakeCalcium(source.path, wall.topology);
+  wall.topology.aorta = AortaOfRun(source.path, messages);
   model.heart = wall.heart;
   if (tracked)
   {

@@ -1,6 +1,7 @@
 #include "InstrumentPanel.h"
 
 #include "InstrumentCatalogue.h"
+#include "Numbers.h"
 
 #include <QFormLayout>
 
@@ -9,6 +10,18 @@ namespace coronary
 namespace
 {
 const char* const NoBalloon = "none";
+
+QString TextOfCatheter(const TickReport& report)
+{
+  if (report.catheterTip < 0.0)
+  {
+    return QString("Catheter in the aorta, %1 mm from ostium").arg(Decimal(-report.catheterTip, 1));
+  }
+  const QString text = QString("Catheter beyond ostium  %1 mm").arg(Decimal(report.catheterTip, 1));
+  return report.seat.engaged
+    ? text + QString(", %1 deg").arg(Decimal(report.seat.angle / Degree, 0))
+    : text;
+}
 
 /// The balloon, lesions and stents as they are now.
 QString TextOfBalloon(const SessionSnapshot& moment, bool hasBalloon)
@@ -63,11 +76,14 @@ InstrumentPanel::InstrumentPanel()
   {
     box->setToolTip("Taken at the next new session");
   }
+  this->FromArch->setToolTip(
+    "At the next new session it lies in the aorta, and has to be brought to the ostium");
   this->Text->setTextFormat(Qt::PlainText);
   this->Text->setWordWrap(true);
   auto* form = new QFormLayout(this);
   form->addRow("Wire", this->Wire);
   form->addRow("Catheter", this->Catheter);
+  form->addRow("", this->FromArch);
   form->addRow("Balloon", this->Balloon);
   form->addRow(this->Next);
   form->addRow(this->Text);
@@ -92,8 +108,10 @@ void InstrumentPanel::ShowNext()
   }
 }
 
-void InstrumentPanel::ShowScenario(const Scenario& scenario)
+void InstrumentPanel::ShowScenario(const Scenario& scenario, bool aorta)
 {
+  this->FromArch->setEnabled(aorta);
+  this->FromArch->setChecked(aorta && scenario.settings.guideFromArch);
   Choose(*this->Wire, QString::fromStdString(scenario.wire.name), {});
   Choose(*this->Catheter, QString::fromStdString(scenario.catheter.name), {});
   Choose(*this->Balloon,
@@ -115,12 +133,12 @@ void InstrumentPanel::ShowMoment(const SessionSnapshot& moment, const WallTopolo
     this->InUse = moment.balloonNumber;
     this->ShowNext();
   }
-  this->Text->setText(QString("Beyond the catheter  %1 mm, in %2\nCatheter beyond ostium  %3 mm\n"
+  this->Text->setText(QString("Beyond the catheter  %1 mm, in %2\n%3\n"
                               "Hand  %4 N, %5 N mm    Tip  %6 N")
                         .arg(Decimal(report.inserted, 1), BranchName(topology, report.branch),
-                          Decimal(report.catheterTip, 1), Decimal(report.proximalForce, 2),
+                          TextOfCatheter(report), Decimal(report.proximalForce, 2),
                           Decimal(report.proximalTorque, 2), Decimal(report.tipForce, 2)) +
-    TextOfBalloon(moment, moment.lumen.size() > 0));
+    TextOfBalloon(moment, !this->Balloons.empty()));
 }
 
 void InstrumentPanel::Take(Scenario& scenario) const
@@ -135,6 +153,7 @@ void InstrumentPanel::Take(Scenario& scenario) const
   {
     scenario.catheter = BuiltInCatalogue().Catheter(catheter).catheter;
   }
+  scenario.settings.guideFromArch = this->FromArch->isChecked();
   const auto balloon = this->Balloon->currentText().toStdString();
   if (balloon == NoBalloon)
   {

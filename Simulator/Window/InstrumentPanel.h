@@ -8,6 +8,7 @@
 #include "PanelWidgets.h"
 #include "TrainingSession.h"
 
+#include <QCheckBox>
 #include <QGroupBox>
 #include <QLabel>
 
@@ -20,7 +21,8 @@ class InstrumentPanel : public QGroupBox
 public:
   InstrumentPanel();
   std::function<void(const RecordedEvent&)> chosen; ///< another balloon
-  void ShowScenario(const Scenario& scenario);
+  /// @param aorta  whether there is one that a guide can come through
+  void ShowScenario(const Scenario& scenario, bool aorta);
   void ShowMoment(const SessionSnapshot& moment, const WallTopology& topology);
   /// What is chosen, into the scenario of a new session.
   void Take(Scenario& scenario) const;
@@ -30,6 +32,7 @@ private:
 
   QComboBox* Wire = ChoiceBox();
   QComboBox* Catheter = ChoiceBox();
+  QCheckBox* FromArch = new QCheckBox("from the arch");
   QComboBox* Balloon = ChoiceBox();
   QPushButton* Next = PanelButton("Exchange", "");
   std::vector<std::string> Balloons; ///< names, in the order in which they are taken

@@ -43,7 +43,7 @@ void TraceWidget::Add(const SessionSnapshot& snapshot)
   {
     this->Samples.clear();
     this->Samples.push_back(
-      { snapshot.seconds, ElectrocardiogramAt(phase, shift), snapshot.aorticPressure });
+      { snapshot.seconds, ElectrocardiogramAt(phase, shift), snapshot.tipPressure });
   }
   else
   {
@@ -58,13 +58,13 @@ void TraceWidget::Add(const SessionSnapshot& snapshot)
       const double share = static_cast<double>(n) / steps;
       this->Samples.push_back({ from + share * (snapshot.seconds - from),
         ElectrocardiogramAt(this->LastPhase + share * turned, shift),
-        this->LastPressure + share * (snapshot.aorticPressure - this->LastPressure) });
+        this->LastPressure + share * (snapshot.tipPressure - this->LastPressure) });
     }
   }
   this->Empty = false;
   this->StShift = shift;
   this->LastPhase = phase;
-  this->LastPressure = snapshot.aorticPressure;
+  this->LastPressure = snapshot.tipPressure;
   while (this->Samples.front().seconds < snapshot.seconds - Shown)
   {
     this->Samples.pop_front();

@@ -317,7 +317,8 @@ void SessionWindow::ShowKeys()
 /// The panels say what the next session begins with.
 void SessionWindow::ShowScenario()
 {
-  this->Instruments->ShowScenario(this->World.scenario);
+  this->Instruments->ShowScenario(
+    this->World.scenario, this->World.wall->Topology().aorta != nullptr);
   this->XRay->ShowScenario(this->World.scenario.imaging);
   this->Heart->ShowRate(this->World.scenario.settings.heartRate);
 }

@@ -92,7 +92,7 @@ void Guide(benchmark::State& state)
   std::vector<Vector3> stumpPoints;
   AppendStump(stump, stumpPoints, bench.ostium);
   VesselWallSettings settings;
-  settings.surfaceReach = 60.0;
+  settings.surfaceReach = 0.0;
   settings.stiffness = 60.0;
   VesselWall aortaWall(aorta, aortaPoints, settings);
   VesselWall stumpWall(stump, stumpPoints, settings);

@@ -560,7 +560,7 @@ TEST(GuideInAorta, TwoLumensAreOne)
     point = Vector3(Wide - 6.0 + point.z(), -point.y(), 60.0 + point.x());
   }
   VesselWallSettings settings;
-  settings.surfaceReach = 60.0;
+  settings.surfaceReach = 0.0;
   VesselWall aortaWall(aorta, aortaPoints, settings);
   VesselWall branchWall(branch, branchPoints, settings);
   JoinedLumen joined(aortaWall, branchWall, Vector3(Wide, 0.0, 60.0), 40.0);
