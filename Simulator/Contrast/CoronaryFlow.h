@@ -138,7 +138,8 @@ public:
 
   ///@{
   /**
-   * The lumen is another one from the next step on; outlets stay as they are calibrated. What lies in it leaves an annulus:
+   * The lumen is another one from the next step on; outlets stay as they are calibrated. An occlusion that is not wider than it
+   * was at rest lets nothing through. What lies in a lumen leaves an annulus:
    * r^4 of Poiseuille's law becomes (b^4 - a^4) - (b^2 - a^2)^2 / ln(b / a), b the lumen's radius, a the instrument's.
    * @param radius      mm, per point of the axes in one list
    * @param instrument  mm, likewise; 0: none
@@ -220,6 +221,7 @@ private:
   FlowNetwork Network_;
   std::vector<std::vector<double>> HealthyRadius; ///< mm, per branch and axis point
   std::vector<std::vector<double>> OpenRadius;    ///< mm, likewise: what blood has of the lumen now
+  std::vector<std::vector<double>> Closed;        ///< mm, likewise: ClosedRadii
   std::vector<BranchResistance> AlongBranch;
   std::vector<Stenosis> Stenoses;
   std::vector<Loss> Losses; ///< per segment; the calibration's are without stenoses

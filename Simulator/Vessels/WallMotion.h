@@ -29,6 +29,8 @@ struct WallTopology
   std::vector<std::vector<double>> axisReference;
   /// Degrees of the section that calcium takes, as axis; empty: none.
   std::vector<std::vector<double>> axisCalcium;
+  /// MPa that the tissue bears which fills the vessel there, as axis; 0: open. Empty: no vessel is occluded.
+  std::vector<std::vector<double>> axisOcclusion;
 };
 
 /// Positions of the wall's points over the cycle. Periodic; any real phase is taken modulo 1.

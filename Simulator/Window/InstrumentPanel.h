@@ -19,21 +19,30 @@ class InstrumentPanel : public QGroupBox
 {
 public:
   InstrumentPanel();
-  std::function<void(const RecordedEvent&)> chosen; ///< another balloon
+  std::function<void(const RecordedEvent&)> chosen; ///< another wire, another balloon
   void ShowScenario(const Scenario& scenario);
   void ShowMoment(const SessionSnapshot& moment, const WallTopology& topology);
   /// What is chosen, into the scenario of a new session.
   void Take(Scenario& scenario) const;
 
 private:
-  void ShowNext();
+  /// Takes the next of the scenario's instruments of a kind, after the last one the first.
+  struct NextButton
+  {
+    QPushButton* button = PanelButton("Exchange", "");
+    std::vector<std::string> names; ///< in the order in which they are taken
+    std::size_t inUse = 0;
+
+    std::size_t Next() const { return (this->inUse + 1) % this->names.size(); }
+    void Show() const;
+    void Use(std::size_t number);
+  };
 
   QComboBox* Wire = ChoiceBox();
   QComboBox* Catheter = ChoiceBox();
   QComboBox* Balloon = ChoiceBox();
-  QPushButton* Next = PanelButton("Exchange", "");
-  std::vector<std::string> Balloons; ///< names, in the order in which they are taken
-  std::size_t InUse = 0;
+  NextButton NextWire;
+  NextButton NextBalloon;
   QLabel* Text = new QLabel;
 };
 }
