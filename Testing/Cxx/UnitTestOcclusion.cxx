@@ -1,0 +1,326 @@
+// Occlusions: tissue in front of a wire's tip, the channel behind it, no blood until it is opened; wires that are exchanged.
+#include "BalloonTestBench.h"
+#include "CoronaryFlow.h"
+#include "Ischaemia.h"
+#include "Numbers.h"
+#include "Recording.h"
+#include "Refusals.h"
+#include "SessionRunner.h"
+#include "WallTestMeshes.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace UnitTestOcclusion
+{
+using namespace coronary;
+
+namespace
+{
+constexpr double Middle = 30.0; // mm from the ostium
+constexpr double Length = 14.0;
+constexpr double Cap = Middle - 0.5 * Length + 3.0; // the first point that tissue fills
+
+/// A straight vessel of 3 mm, a point of its axis each half millimetre, with an occlusion.
+std::shared_ptr<WallMotion> OccludedTube(double strength = VesselLesion().strength)
+{
+  WallTopology topology;
+  std::vector<Vector3> points;
+  AppendTube(topology, points, 0.0, 1.5, 100.0, 24, 200);
+  const auto tube = std::make_shared<StillWallMotion>(topology, points);
+  VesselLesion lesion{ "tube0", Middle, Length, 1.0, 0.0, strength };
+  return std::make_shared<NarrowedWallMotion>(tube, std::vector<VesselLesion>{ lesion });
+}
+
+const Guidewire& Wire(const char* name)
+{
+  return BuiltInCatalogue().Wire(name).wire;
+}
+
+Guidewire EvenWire(double radius)
+{
+  Guidewire wire;
+  wire.name = "even";
+  WireSection section;
+  section.length = 1800.0;
+  section.bendingStiffness1 = section.bendingStiffness2 = 30.0;
+  section.torsionalStiffness = 23.0;
+  section.axialStiffness = 8000.0;
+  section.radius = radius;
+  section.density = 7000.0;
+  section.friction = 0.1;
+  wire.sections = { section };
+  return wire;
+}
+
+/// A wire in the tube, and a hand that moves evenly.
+struct Hand
+{
+  explicit Hand(const Guidewire& wire, const std::shared_ptr<WallMotion>& wall = OccludedTube())
+    : Physics(wall, wire, BuiltInCatalogue().Catheter("EBU3.5-6F").catheter, AtRest())
+  {
+  }
+  static InterventionSettings AtRest()
+  {
+    InterventionSettings settings;
+    settings.heartRate = 0.0;
+    return settings;
+  }
+  const OcclusionPlug& Plug() const { return this->Physics.Plugs().at(0); }
+  double Tip() const { return this->Physics.Centerline().front().z(); }
+
+  /// @param look  after each tick
+  void Move(double mm, double speed, const std::function<void(const TickReport&)>& look = {})
+  {
+    const int ticks = static_cast<int>(std::lround(std::abs(mm) / speed * 2000.0));
+    for (int tick = 0; tick < ticks; ++tick)
+    {
+      this->Input.wirePosition += mm / ticks;
+      const TickReport& report = this->Physics.Step(this->Input);
+      ASSERT_EQ(report.outside, 0);
+      this->Most = std::max(this->Most, report.capForce);
+      if (look)
+      {
+        look(report);
+      }
+    }
+  }
+
+  Intervention Physics;
+  DriveInput Input;
+  double Most = 0.0; ///< N on the cap
+};
+
+/// mm of wire from the hand's start until its tip is at the cap.
+constexpr double ToCap = Cap - 1.0;
+}
+
+TEST(Occlusion, FillsTheVesselBetweenTwoStumps)
+{
+  const std::shared_ptr<WallMotion> wall = OccludedTube(7.0);
+  const WallTopology& topology = wall->Topology();
+  std::vector<Vector3> points;
+  wall->Positions(0.0, points);
+  CheckWallSurface(topology, points);
+  const std::vector<FoundLesion> lesions = FindLesions(topology);
+  ASSERT_EQ(lesions.size(), 1U);
+  EXPECT_EQ(lesions[0].degree, 1.0);
+  EXPECT_EQ(lesions[0].vessel, "tube0");
+  const std::vector<Occlusion> occlusions = FindOcclusions(topology);
+  ASSERT_EQ(occlusions.size(), 1U);
+  EXPECT_EQ(occlusions[0].strength, 7.0);
+  EXPECT_NEAR(occlusions[0].places.back(), Length - 6.0, 1e-9);
+  EXPECT_NEAR(topology.axis[0][occlusions[0].points.front()].z(), Cap, 1e-9);
+  for (const Vector3& point : points)
+  {
+    const double radius = point.head<2>().norm();
+    if (std::abs(point.z() - Middle) < 0.5 * Length - 3.0)
+    {
+      EXPECT_TRUE(radius < 1e-9 || std::abs(radius - ChannelRadius) < 1e-6) << radius;
+    }
+    else if (std::abs(point.z() - Middle) > 0.5 * Length && radius > 0.0)
+    {
+      EXPECT_NEAR(radius, 1.5, 1e-9);
+    }
+  }
+  const std::vector<double>& closed = ClosedRadii(topology)[0];
+  EXPECT_NEAR(closed[60], ChannelRadius, 1e-9);
+  EXPECT_EQ(closed[40], 0.0);
+}
+
+TEST(Occlusion, BadOnesAreRefusedByName)
+{
+  const auto refused = [](const VesselLesion& lesion, const std::string& words)
+  {
+    ExpectRefusal([&] { NarrowedWallMotion wall(LesionedPhantom(), { lesion }); },
+      "'" + lesion.vessel + "'", words);
+  };
+  refused({ "mLAD", 12.0, 14.0, 0.97, 0.0 }, "a degree");
+  refused({ "mLAD", 12.0, 14.0, 1.0, 0.0, -1.0 }, "a strength of its cap");
+  refused({ "mLAD", 12.0, 14.0, 1.0, 0.0, std::nan("") }, "a strength of its cap");
+  refused({ "mLAD", 12.0, 3.0, 1.0, 0.0 }, "a length (mm)");
+  WallTopology topology;
+  std::vector<Vector3> points;
+  AppendTube(topology, points, 0.0, 0.3, 50.0, 12, 100);
+  const auto thin = std::make_shared<StillWallMotion>(topology, points);
+  ExpectRefusal(
+    [&] {
+      NarrowedWallMotion(thin, { { "tube0", 25.0, 14.0, 1.0, 0.0 } });
+    },
+    "'tube0'", "a radius (mm)");
+}
+
+// The hand's load goes into the tip as long as the wire is straight: what moves the plug on is strength x section.
+TEST(Occlusion, YieldsAtStrengthTimesSection)
+{
+  for (const double strength : { 4.0, 12.0 })
+  {
+    for (const double radius : { 0.1145, 0.178 })
+    {
+      Hand hand(EvenWire(radius), OccludedTube(strength));
+      hand.Move(ToCap, 20.0);
+      ASSERT_EQ(hand.Plug().Crossed(), 0.0);
+      double sum = 0.0;
+      int ticks = 0;
+      double before = 0.0;
+      hand.Move(4.0, 0.5,
+        [&](const TickReport& report)
+        {
+          const double crossed = hand.Plug().Crossed();
+          EXPECT_GE(crossed, before) << "it does not come back";
+          if (crossed > before)
+          {
+            sum += report.capForce;
+            ++ticks;
+          }
+          before = crossed;
+        });
+      ASSERT_GT(ticks, 1000);
+      const double section = Pi * radius * radius;
+      Print("plug of an occlusion yields: N", strength * section, sum / ticks);
+      EXPECT_NEAR(sum / ticks, strength * section, 0.02 * strength * section);
+      EXPECT_EQ(hand.Plug().YieldForce(radius), strength * section);
+      // What the plug went, the tip went, but for what both are pressed together.
+      EXPECT_NEAR(hand.Tip() + radius - Cap, hand.Plug().Crossed(), 0.3);
+      EXPECT_GT(hand.Plug().Crossed(), 1.0);
+      EXPECT_FALSE(hand.Plug().IsCrossed());
+    }
+  }
+}
+
+TEST(Occlusion, LessThanThatDoesNotMoveIt)
+{
+  Hand hand(EvenWire(0.178), OccludedTube());
+  hand.Move(ToCap, 20.0);
+  const double yields = hand.Plug().YieldForce(0.178);
+  while (hand.Physics.Report().capForce < 0.95 * yields)
+  {
+    hand.Move(0.001, 1.0);
+  }
+  for (int beat = 0; beat < 10; ++beat)
+  {
+    hand.Move(0.02, 1.0);
+    hand.Move(-0.02, 1.0);
+  }
+  EXPECT_LT(hand.Most, yields);
+  EXPECT_GT(hand.Most, 0.9 * yields);
+  EXPECT_EQ(hand.Plug().Crossed(), 0.0);
+}
+
+// The same hands: what the first wire's tip bears before it buckles is not enough, whatever the speed.
+TEST(Occlusion, AWorkhorseBucklesAndACtoWirePasses)
+{
+  for (const double speed : { 2.0, 10.0, 50.0, 150.0 })
+  {
+    Hand soft(Wire("workhorse"));
+    soft.Move(ToCap + 12.0, speed);
+    std::printf(
+      "workhorse at %g mm/s: %.3f of %.3f N\n", speed, soft.Most, soft.Plug().YieldForce(0.178));
+    EXPECT_EQ(soft.Plug().Crossed(), 0.0) << speed;
+    EXPECT_GT(soft.Most, 0.05) << "it did press";
+    EXPECT_LT(soft.Tip(), Cap);
+  }
+  Hand stiff(Wire("cto-9gf"));
+  stiff.Move(ToCap + 14.0, 2.0);
+  std::printf("cto-9gf: %.3f N\n", stiff.Most);
+  EXPECT_TRUE(stiff.Plug().IsCrossed());
+  EXPECT_GT(stiff.Tip(), Cap + stiff.Plug().Length());
+}
+
+TEST(Occlusion, TheChannelStaysForEveryWire)
+{
+  Hand hand(Wire("cto-9gf"));
+  hand.Move(ToCap + 5.0, 2.0);
+  const double crossed = hand.Plug().Crossed();
+  ASSERT_GT(crossed, 2.0);
+  ASSERT_LT(crossed, hand.Plug().Length());
+  hand.Most = 0.0;
+  hand.Move(-20.0, 10.0);
+  EXPECT_EQ(hand.Plug().Crossed(), crossed);
+  EXPECT_FALSE(hand.Physics.Exchange(Wire("workhorse"))) << "it is out";
+  const std::vector<std::string> messages = hand.Physics.TakeMessages();
+  ASSERT_EQ(messages.size(), 1U);
+  EXPECT_NE(messages[0].find("the wire is not exchanged"), std::string::npos);
+  hand.Move(-15.0, 30.0);
+  ASSERT_EQ(hand.Physics.Report().inserted, 0.0);
+  EXPECT_TRUE(hand.Physics.Exchange(Wire("workhorse")));
+  EXPECT_EQ(hand.Physics.Wire().name, "workhorse");
+  hand.Most = 0.0;
+  while (hand.Physics.Report().capForce == 0.0 && hand.Tip() < Cap + hand.Plug().Length())
+  {
+    hand.Move(0.1, 5.0);
+  }
+  EXPECT_NEAR(hand.Tip(), Cap + crossed, 0.5) << "up to what is left";
+  hand.Move(3.0, 5.0);
+  EXPECT_EQ(hand.Plug().Crossed(), crossed);
+}
+
+TEST(Occlusion, BitsRepeat)
+{
+  const auto run = [](double strength)
+  {
+    Hand hand(Wire("cto-9gf"), OccludedTube(strength));
+    hand.Move(ToCap + 6.0, 10.0);
+    return hand.Physics.StateHash();
+  };
+  EXPECT_EQ(run(12.0), run(12.0));
+  EXPECT_NE(run(12.0), run(11.9));
+}
+
+TEST(WireExchange, IsTheOtherWireFromTheBeginning)
+{
+  Hand other(Wire("cto-9gf"));
+  Hand exchanged(Wire("workhorse"));
+  EXPECT_TRUE(exchanged.Physics.Exchange(Wire("cto-9gf")));
+  for (Hand* hand : { &other, &exchanged })
+  {
+    hand->Move(ToCap + 1.0, 20.0);
+  }
+  EXPECT_EQ(other.Physics.StateHash(), exchanged.Physics.StateHash());
+  Guidewire thick = Wire("workhorse");
+  thick.name = "thick";
+  thick.sections[4].radius = 0.95;
+  ExpectRefusal([&] { exchanged.Physics.Exchange(thick); }, "'thick'", "'EBU3.5-6F'");
+}
+
+TEST(OcclusionFlow, NothingComesThroughUntilABalloonHasOpenedIt)
+{
+  const std::shared_ptr<WallMotion> wall = OccludedTube();
+  const WallTopology& topology = wall->Topology();
+  CoronaryFlow flow(topology, {});
+  const std::vector<double> none(topology.axisRadius[0].size(), 0.0);
+  const auto settled = [&]
+  {
+    for (int k = 0; k < 2000; ++k)
+    {
+      flow.Step(0.005, 0.5, 0.0);
+    }
+    return flow.TreeFlow(0);
+  };
+  const double healthy = flow.HealthyTipFlows()[1];
+  ASSERT_GT(healthy, 0.1);
+  EXPECT_LT(std::abs(settled()), 1e-4 * healthy);
+  EXPECT_NEAR(flow.PressureAt({ 0, 60.0 }), 5.0, 0.1) << "behind it: venous pressure";
+  EXPECT_NEAR(flow.PressureAt({ 0, 10.0 }), flow.AorticPressureNow(), 0.01);
+  EXPECT_LT(flow.FlowReserves({ { 0, 60.0 } })[0], 0.1);
+  Ischaemia heart(flow);
+  flow.SetLumen(topology.axisRadius[0], none);
+  EXPECT_LT(std::abs(settled()), 1e-4 * healthy) << "the channel of a wire";
+  heart.SetFlow(flow);
+  EXPECT_EQ(heart.ShareWithout(), 0.0) << "its heart lives without it";
+  std::vector<double> opened = topology.axisRadius[0];
+  std::replace_if(
+    opened.begin(), opened.end(), [](double radius) { return radius < 1.2; }, 1.2);
+  flow.SetLumen(opened, none);
+  EXPECT_GT(settled(), 0.5 * healthy);
+  EXPECT_GT(flow.FlowReserves({ { 0, 60.0 } })[0], 0.9);
+  flow.SetLumen(topology.axisRadius[0], none);
+  EXPECT_LT(std::abs(settled()), 1e-4 * healthy);
+}
+}
