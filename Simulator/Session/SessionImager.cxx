@@ -346,7 +346,7 @@ InstrumentChain SessionImager::WireOf(const SessionSnapshot& snapshot) const
       wire.points.push_back(snapshot.catheter[n]);
     }
   }
-  const Guidewire& device = *WireOf(this->Scenario_, snapshot.wireNumber);
+  const Guidewire& device = *coronary::WireOf(this->Scenario_, snapshot.wireNumber);
   double along = 0.0;
   for (std::size_t n = 0; n + 1 < wire.points.size(); ++n)
   {
