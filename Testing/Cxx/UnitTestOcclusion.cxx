@@ -322,4 +322,64 @@ TEST(OcclusionFlow, NothingComesThroughUntilABalloonHasOpenedIt)
   flow.SetLumen(topology.axisRadius[0], none);
   EXPECT_LT(std::abs(settled()), 1e-4 * healthy);
 }
+
+// Recorded hands: an angiogram from two sides, a workhorse that buckles, the CTO wire, a balloon, a stent, an angiogram.
+TEST(OcclusionProcedure, TheRecordedOneRepeatsToTheBit)
+{
+  auto source = std::make_unique<ReplaySource>(
+    std::string(DYNAMICCORONARY_SOURCE_DIR) + "/Testing/Data/Driving/cto-lad.pcirec");
+  const ReplaySource* replay = source.get();
+  const Scenario scenario =
+    ScenarioFromText(source->Reader().Header().scenario, "The recording", ".");
+  const auto wall = std::make_shared<NarrowedWallMotion>(
+    MakePhantomWallMotion(scenario.vessels.phantom, scenario.vessels.phantom.surfaceSpacing, 40),
+    scenario.lesions);
+  const std::uint64_t hash = WallHash(*wall);
+  ASSERT_EQ(hash, source->Reader().Header().meshHash);
+  SessionRunner runner(wall, scenario, hash, std::move(source));
+  const Intervention& instruments = runner.Session().Instruments();
+  int outside = 0;
+  double deepest = 0.0;
+  double most[2] = { 0.0, 0.0 }; // N on the cap, of both wires
+  double crossed = 0.0;          // mm, by the first one
+  double behind = 0.0;           // mL/s behind it, before there was a balloon
+  const int distal = FindLesions(wall->Topology())[0].branch + 1;
+  runner.afterTick = [&](const SessionReport& report)
+  {
+    outside += report.tick.outside;
+    deepest = std::max(deepest, report.tick.maximumPenetration);
+    const bool first = instruments.Wire().name == "workhorse";
+    most[first ? 0 : 1] = std::max(most[first ? 0 : 1], report.tick.capForce);
+    crossed = first ? instruments.Plugs()[0].Crossed() : crossed;
+    if (report.tick.balloon.tip < 0.0 && instruments.Stents().empty())
+    {
+      behind = std::max(behind, std::abs(runner.Session().Contrast().Flow(distal)));
+    }
+  };
+  while (runner.Run(1000))
+  {
+  }
+  EXPECT_EQ(replay->Reader().HowEnded(), RecordingReader::Ending::Complete);
+  EXPECT_GT(runner.Compared().compared, 50U);
+  EXPECT_EQ(runner.Compared().equal, runner.Compared().compared)
+    << "from tick " << runner.Compared().firstDifference;
+  EXPECT_EQ(outside, 0);
+  EXPECT_LT(deepest, 0.25);
+  EXPECT_EQ(crossed, 0.0) << "the workhorse buckles";
+  EXPECT_GT(most[0], 0.1);
+  const OcclusionPlug& plug = instruments.Plugs().at(0);
+  EXPECT_LT(most[0], plug.YieldForce(0.178));
+  EXPECT_GT(most[1], plug.YieldForce(0.1145));
+  EXPECT_TRUE(plug.IsCrossed());
+  EXPECT_LT(behind, 1e-3) << "mL/s";
+  const std::vector<LesionResult> lesions = runner.Session().Lesions();
+  ASSERT_EQ(lesions.size(), 1U);
+  EXPECT_EQ(lesions[0].degreeBefore, 1.0);
+  EXPECT_LT(lesions[0].degree, 0.3);
+  EXPECT_LT(lesions[0].reserveBefore, 0.1);
+  EXPECT_GT(lesions[0].reserve, 0.9);
+  EXPECT_EQ(runner.Session().Procedure().reached.size(), 8U);
+  EXPECT_TRUE(runner.Session().Score().passed);
+  EXPECT_EQ(runner.Session().Metrics().greatestStShift, 0.0) << "its heart lived without it";
+}
 }
