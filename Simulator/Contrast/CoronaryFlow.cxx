@@ -353,6 +353,22 @@ void CoronaryFlow::SetLumen(
   }
 }
 
+double CoronaryFlow::OpenTo(int segment) const
+{
+  const FlowSegment& here = this->Network_.Segments()[segment];
+  const std::vector<double>& s = this->Network_.Branches()[here.branch].abscissa;
+  for (std::size_t k = 0; k < s.size(); ++k)
+  {
+    const bool within = s[k] >= here.from && s[k] < here.to;
+    if (within && this->Closed[here.branch][k] > 0.0 &&
+      this->OpenRadius[here.branch][k] <= ClosedRadius)
+    {
+      return s[k];
+    }
+  }
+  return here.to;
+}
+
 double CoronaryFlow::PressureAt(const CatheterTip& place) const
 {
   const FlowNetwork::Place here = this->Network_.Locate(place);

@@ -145,6 +145,8 @@ public:
    * @param instrument  mm, likewise; 0: none
    */
   void SetLumen(const std::vector<double>& radius, const std::vector<double>& instrument);
+  /// mm along a segment's branch, where an occlusion begins that lets nothing through; without one the segment's end.
+  double OpenTo(int segment) const;
   /// mmHg now, at a place.
   double PressureAt(const CatheterTip& place) const;
   /// Fractional flow reserves: mean pressure at places over the aortic one in steady flow, with the outlets' resistance a

@@ -343,7 +343,11 @@ TEST(OcclusionProcedure, TheRecordedOneRepeatsToTheBit)
   double most[2] = { 0.0, 0.0 }; // N on the cap, of both wires
   double crossed = 0.0;          // mm, by the first one
   double behind = 0.0;           // mL/s behind it, before there was a balloon
-  const int distal = FindLesions(wall->Topology())[0].branch + 1;
+  const Occlusion occlusion = FindOcclusions(wall->Topology()).at(0);
+  const int occluded = FindLesions(wall->Topology())[0].branch;
+  const int distal = occluded + 1;
+  double stump = 0.0;    // of contrast medium, 3 mm before the cap
+  double darkness = 1.0; // likewise, a point behind the cap
   runner.afterTick = [&](const SessionReport& report)
   {
     outside += report.tick.outside;
@@ -351,6 +355,14 @@ TEST(OcclusionProcedure, TheRecordedOneRepeatsToTheBit)
     const bool first = instruments.Wire().name == "workhorse";
     most[first ? 0 : 1] = std::max(most[first ? 0 : 1], report.tick.capForce);
     crossed = first ? instruments.Plugs()[0].Crossed() : crossed;
+    if (report.tick.tick == 3000)
+    {
+      // A branch has a slab less than points.
+      const std::int64_t slab = occlusion.points.front() - occluded;
+      const std::vector<double>& medium = runner.Session().Contrast().Concentration();
+      stump = medium[slab - 6];
+      darkness = medium[slab + 1];
+    }
     if (report.tick.balloon.tip < 0.0 && instruments.Stents().empty())
     {
       behind = std::max(behind, std::abs(runner.Session().Contrast().Flow(distal)));
@@ -372,6 +384,8 @@ TEST(OcclusionProcedure, TheRecordedOneRepeatsToTheBit)
   EXPECT_GT(most[1], plug.YieldForce(0.1145));
   EXPECT_TRUE(plug.IsCrossed());
   EXPECT_LT(behind, 1e-3) << "mL/s";
+  EXPECT_GT(stump, 0.3);
+  EXPECT_EQ(darkness, 0.0);
   const std::vector<LesionResult> lesions = runner.Session().Lesions();
   ASSERT_EQ(lesions.size(), 1U);
   EXPECT_EQ(lesions[0].degreeBefore, 1.0);
