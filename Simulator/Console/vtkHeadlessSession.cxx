@@ -208,8 +208,7 @@ public:
     const double seconds = static_cast<double>(this->Tick) / scenario.settings.tickRate;
     char name[40];
     std::snprintf(name, sizeof(name), "wire_%05zu.vtp", this->WireFiles.size());
-    WriteInstruments(
-      this->Folder->Add(name), intervention, scenario.wire, scenario.catheter, messages);
+    WriteInstruments(this->Folder->Add(name), intervention, scenario.catheter, messages);
     this->WireFiles.push_back({ name, seconds });
     if (this->Wall)
     {
@@ -780,6 +779,8 @@ Json NameOfEvent(std::uint8_t kind)
       return "field_of_view_mm";
     case RecordedEvent::Exchange:
       return "balloon_number";
+    case RecordedEvent::ExchangeWire:
+      return "wire_number";
     default:
       return static_cast<int>(kind);
   }

@@ -65,8 +65,9 @@ void AddLine(const std::vector<Vector3>& line, int instrument, const RadiusFunct
 }
 
 void WriteInstruments(const std::string& path, const Intervention& intervention,
-  const Guidewire& wire, const GuideCatheter& catheter, vtkMessageTrap& messages)
+  const GuideCatheter& catheter, vtkMessageTrap& messages)
 {
+  const Guidewire& wire = intervention.Wire();
   vtkNew<vtkPolyData> data;
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();

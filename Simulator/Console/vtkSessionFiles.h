@@ -25,7 +25,7 @@ namespace coronary
  * @throws std::runtime_error naming the file
  */
 void WriteInstruments(const std::string& path, const Intervention& intervention,
-  const Guidewire& wire, const GuideCatheter& catheter, vtkMessageTrap& messages);
+  const GuideCatheter& catheter, vtkMessageTrap& messages);
 
 /// The wall, written moment by moment with the same cells: CellEntityIds, and GroupIds of the points.
 class vtkWallFiles

@@ -215,7 +215,38 @@ const std::vector<double>& ContrastModel::Concentration() const
     this->SmoothBranch(b);
     this->LimitBranch(b);
   }
+  if (!this->Flow_.Network().Topology().axisOcclusion.empty())
+  {
+    this->FillStumps();
+  }
   return this->Concentration_;
+}
+
+/// Nothing flows there, but what passes the mouth of a stump mixes into it: at once, and uncounted.
+void ContrastModel::FillStumps() const
+{
+  const FlowNetwork& network = this->Flow_.Network();
+  for (std::size_t s = 0; s < network.Segments().size(); ++s)
+  {
+    const FlowSegment& segment = network.Segments()[s];
+    const int before = network.Nodes()[segment.above].above;
+    const double openTo = this->Flow_.OpenTo(static_cast<int>(s));
+    if (openTo >= segment.to || before < 0)
+    {
+      continue;
+    }
+    const FlowSegment& above = network.Segments()[before];
+    const double mouth = this->Concentration_[this->SlabAt(
+      above.branch, above.volumeFrom + (1.0 - 1e-9) * above.volume)];
+    const std::vector<double>& place = network.Branches()[segment.branch].abscissa;
+    for (std::size_t k = 0; k + 1 < place.size(); ++k)
+    {
+      if (place[k] >= segment.from && place[k + 1] <= openTo)
+      {
+        this->Concentration_[this->BranchSlab[segment.branch] + k] = mouth;
+      }
+    }
+  }
 }
 
 /// From mL to fractions: (V + L) c = mL, L the conductances between neighbours (Thomas algorithm).

@@ -141,6 +141,7 @@ private:
   double SlabVolume(std::size_t slab) const; ///< mL, above 0
   void SmoothBranch(std::size_t branch) const;
   void LimitBranch(std::size_t branch) const;
+  void FillStumps() const;
 
   ContrastSettings Settings_;
   CoronaryFlow Flow_;

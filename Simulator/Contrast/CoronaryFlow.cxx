@@ -20,7 +20,7 @@ constexpr double ReferenceLength = 100.0; // mm
 constexpr double OutletLength = 10.0;     // mm before a tip whose mean radius is the outlet's
 constexpr double ExpansionLoss = 1.52;    // K_t of Seeley and Young
 constexpr int StepsOfCycle = 160;
-constexpr double ClosedRadius = 0.02; // mm of what an instrument leaves, at least
+constexpr double ClosedRadius = 0.02; // mm of what an instrument leaves, at least, and an occlusion
 
 constexpr RequireOf RequireFlow{ "coronary flow" };
 
@@ -142,7 +142,16 @@ CoronaryFlow::CoronaryFlow(const WallTopology& topology, const CoronaryFlowSetti
   this->Fraction.assign(trees, 0.0);
   this->OutletFactor.assign(trees, 1.0);
 
+  this->Closed = ClosedRadii(this->Network_.Topology());
   this->OpenRadius = this->Network_.Topology().axisRadius;
+  for (std::size_t b = 0; b < this->Closed.size(); ++b)
+  {
+    for (std::size_t k = 0; k < this->Closed[b].size(); ++k)
+    {
+      double& open = this->OpenRadius[b][k];
+      open = open > this->Closed[b][k] ? open : ClosedRadius;
+    }
+  }
   if (topology.axisReference.empty())
   {
     this->FindStenoses();
@@ -302,12 +311,14 @@ void CoronaryFlow::SetLumen(
   std::size_t point = 0;
   for (std::size_t b = 0; b < this->OpenRadius.size(); ++b)
   {
-    for (double& open : this->OpenRadius[b])
+    for (std::size_t k = 0; k < this->OpenRadius[b].size(); ++k, ++point)
     {
-      const double now = AnnulusRadius(radius.at(point), instrument.at(point));
+      double& open = this->OpenRadius[b][k];
+      const double lumen = radius.at(point);
+      const double now =
+        lumen > this->Closed[b][k] ? AnnulusRadius(lumen, instrument.at(point)) : ClosedRadius;
       changed[b] |= now != open ? 1 : 0;
       open = now;
-      ++point;
     }
     if (changed[b] != 0)
     {
@@ -340,6 +351,22 @@ void CoronaryFlow::SetLumen(
       this->Losses[s] = this->LossBetween(static_cast<int>(s), segment.from, segment.to);
     }
   }
+}
+
+double CoronaryFlow::OpenTo(int segment) const
+{
+  const FlowSegment& here = this->Network_.Segments()[segment];
+  const std::vector<double>& s = this->Network_.Branches()[here.branch].abscissa;
+  for (std::size_t k = 0; k < s.size(); ++k)
+  {
+    const bool within = s[k] >= here.from && s[k] < here.to;
+    if (within && this->Closed[here.branch][k] > 0.0 &&
+      this->OpenRadius[here.branch][k] <= ClosedRadius)
+    {
+      return s[k];
+    }
+  }
+  return here.to;
 }
 
 double CoronaryFlow::PressureAt(const CatheterTip& place) const

@@ -138,12 +138,15 @@ public:
 
   ///@{
   /**
-   * The lumen is another one from the next step on; outlets stay as they are calibrated. What lies in it leaves an annulus:
+   * The lumen is another one from the next step on; outlets stay as they are calibrated. An occlusion that is not wider than it
+   * was at rest lets nothing through. What lies in a lumen leaves an annulus:
    * r^4 of Poiseuille's law becomes (b^4 - a^4) - (b^2 - a^2)^2 / ln(b / a), b the lumen's radius, a the instrument's.
    * @param radius      mm, per point of the axes in one list
    * @param instrument  mm, likewise; 0: none
    */
   void SetLumen(const std::vector<double>& radius, const std::vector<double>& instrument);
+  /// mm along a segment's branch, where an occlusion begins that lets nothing through; without one the segment's end.
+  double OpenTo(int segment) const;
   /// mmHg now, at a place.
   double PressureAt(const CatheterTip& place) const;
   /// Fractional flow reserves: mean pressure at places over the aortic one in steady flow, with the outlets' resistance a
@@ -220,6 +223,7 @@ private:
   FlowNetwork Network_;
   std::vector<std::vector<double>> HealthyRadius; ///< mm, per branch and axis point
   std::vector<std::vector<double>> OpenRadius;    ///< mm, likewise: what blood has of the lumen now
+  std::vector<std::vector<double>> Closed;        ///< mm, likewise: ClosedRadii
   std::vector<BranchResistance> AlongBranch;
   std::vector<Stenosis> Stenoses;
   std::vector<Loss> Losses; ///< per segment; the calibration's are without stenoses

@@ -134,6 +134,7 @@ FlowNetwork::FlowNetwork(const WallTopology& topology, const std::vector<Coronar
   this->Topology_.parent = topology.parent;
   this->Topology_.groupName = topology.groupName;
   this->Topology_.axisReference = topology.axisReference;
+  this->Topology_.axisOcclusion = topology.axisOcclusion;
   this->Topology_.groupName.resize(topology.axis.size());
   this->MeasureBranches();
   this->Connect();

@@ -15,7 +15,7 @@ namespace
 constexpr std::size_t MostPieces = 100000;
 constexpr double LongestPiece = 36000.0; // s
 constexpr double MaximumHeartRate = 240.0;
-constexpr std::int64_t MostBalloons = 100;
+constexpr std::int64_t MostExchanges = 100;
 constexpr double FurthestOfOld = 1e6; // mm, degrees, mL
 
 std::uint32_t PedalsOf(JsonFields& fields)
@@ -65,7 +65,9 @@ DrivePiece PieceOf(JsonFields& member, PiecesOf form)
   piece.setsHeartRate = member.Has("heart_rate_bpm");
   piece.heartRate = member.Number("heart_rate_bpm", 0.0, MaximumHeartRate, 0.0);
   piece.exchanges = member.Has("exchange");
-  piece.exchange = static_cast<double>(member.Whole("exchange", 0, MostBalloons, 0));
+  piece.exchange = static_cast<double>(member.Whole("exchange", 0, MostExchanges, 0));
+  piece.exchangesWire = member.Has("exchange_wire");
+  piece.wire = static_cast<double>(member.Whole("exchange_wire", 0, MostExchanges, 0));
   member.Done();
   return piece;
 }
@@ -156,6 +158,11 @@ std::vector<double> DriveScript::HeartRates(double from, double to) const
 std::vector<double> DriveScript::Exchanges(double from, double to) const
 {
   return this->Chosen(from, to, &DrivePiece::exchanges, &DrivePiece::exchange);
+}
+
+std::vector<double> DriveScript::WireExchanges(double from, double to) const
+{
+  return this->Chosen(from, to, &DrivePiece::exchangesWire, &DrivePiece::wire);
 }
 
 DriveScript DriveScriptOf(JsonFields& fields, PiecesOf form)

@@ -26,6 +26,8 @@ struct DrivePiece
   double heartRate = 0.0;     ///< beats a minute
   bool exchanges = false;     ///< when the piece begins
   double exchange = 0.0;      ///< number of the balloon that is taken
+  bool exchangesWire = false; ///< when the piece begins
+  double wire = 0.0;          ///< number of the wire that is taken
 };
 
 class DriveScript
@@ -46,6 +48,7 @@ public:
   std::vector<double> HeartRates(double from, double to) const;
   /// Likewise numbers of the balloons that are taken.
   std::vector<double> Exchanges(double from, double to) const;
+  std::vector<double> WireExchanges(double from, double to) const; ///< likewise of the wires
 
 private:
   std::vector<double> Chosen(

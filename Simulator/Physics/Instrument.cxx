@@ -34,6 +34,33 @@ void RequirePieces(
       std::to_string(minimum) + " to " + std::to_string(MostPieces) + ".");
   }
 }
+
+void RequireThinner(const std::string& what, double thick, const GuideCatheter& catheter)
+{
+  if (thick >= catheter.innerRadius)
+  {
+    char text[256];
+    std::snprintf(text, sizeof(text),
+      "%s is thicker (radius %.3f mm) than the inside of the catheter '%s' (radius %.3f mm)",
+      what.c_str(), thick, catheter.name.c_str(), catheter.innerRadius);
+    throw std::invalid_argument(text);
+  }
+}
+}
+
+void RequireFit(const BalloonCatheter& balloon, const GuideCatheter& catheter)
+{
+  balloon.Validate();
+  RequireThinner("the balloon '" + balloon.name + "'", balloon.Profile(), catheter);
+}
+
+void RequireFit(const Guidewire& wire, const GuideCatheter& catheter)
+{
+  wire.Validate();
+  for (const WireSection& section : wire.sections)
+  {
+    RequireThinner("the wire '" + wire.name + "'", section.radius, catheter);
+  }
 }
 
 void Guidewire::Validate() const

@@ -199,6 +199,12 @@ struct BalloonCatheter
     return this->tipLength + this->length + this->shoulder;
   } ///< mm, of the balloon's end
 };
+
+///@{
+/// @throws std::invalid_argument  naming the instrument and the property; one that does not fit into the catheter
+void RequireFit(const BalloonCatheter& balloon, const GuideCatheter& catheter);
+void RequireFit(const Guidewire& wire, const GuideCatheter& catheter);
+///@}
 }
 
 #endif

@@ -45,6 +45,16 @@ double Hardening(double gap)
   return 1.0 + std::max(0.0, -gap - deepInside) / twiceAsHard;
 }
 
+CosseratRod NewRod(int capacity)
+{
+  RodSettings rod;
+  rod.mediumFollowsWalls = true;
+  rod.reach = 0.08; // a little less than `trust`: what comes nearer is seen in the next tick
+  rod.maximumMove = 1.0;
+  rod.trust = 0.1;
+  return CosseratRod(capacity, rod);
+}
+
 enum class Notice : int
 {
   NotFinite = 0,
@@ -58,6 +68,7 @@ enum class Notice : int
   BalloonLimit,
   StentInGuide,
   NotExchanged,
+  WireNotExchanged,
   Count
 };
 
@@ -70,21 +81,8 @@ const char* const NoticeText[] = { "the input is not finite: the instruments are
   "the wire left the lumen and was put back",
   "the balloon is at the end of its way: it has to stay on the wire, and in the guide",
   "the stent is not wholly out of the guide catheter: its balloon is not inflated",
-  "the balloon is not exchanged: first it has to be emptied and drawn back into the guide" };
-}
-
-void RequireFit(const BalloonCatheter& balloon, const GuideCatheter& catheter)
-{
-  balloon.Validate();
-  if (balloon.Profile() >= catheter.innerRadius)
-  {
-    char text[256];
-    std::snprintf(text, sizeof(text),
-      "the balloon '%s' is thicker (radius %.3f mm) than the inside of the catheter '%s' (radius "
-      "%.3f mm)",
-      balloon.name.c_str(), balloon.Profile(), catheter.name.c_str(), catheter.innerRadius);
-    throw std::invalid_argument(text);
-  }
+  "the balloon is not exchanged: first it has to be emptied and drawn back into the guide",
+  "the wire is not exchanged: first it has to be drawn back into the guide" };
 }
 
 void InterventionSettings::Validate() const
@@ -162,6 +160,8 @@ struct Intervention::Internals : ContactSurface
   double SleeveHand = 0.0;  // as accepted
   std::vector<PlacedStent> Stents;
   double Inflator = 0.0; // atm
+
+  OcclusionPlugs Plugs;
 
   struct Sane
   {
@@ -252,6 +252,7 @@ struct Intervention::Internals : ContactSurface
     {
       contacts.plane[p].stiffness *= Hardening(contacts.plane[p].gap);
     }
+    this->Plugs.Meet(sample, reach, contacts);
   }
 
   /// mm to be added to u, so that it is counted from the ostium.
@@ -324,6 +325,9 @@ struct Intervention::Internals : ContactSurface
 
 void Intervention::Internals::MakeSegments()
 {
+  this->Segments.clear();
+  this->Joints.clear();
+  this->Places.clear();
   const double whole = this->Settings.segmentLength;
   double from = 0.0;
   for (int i = 0; i < this->Settings.capacity; ++i)
@@ -417,42 +421,16 @@ void Intervention::Internals::Engage(
 /// @throws std::invalid_argument  an instrument does not fit where it is at the beginning
 void Intervention::Internals::RequireRoom(int root) const
 {
-  const WallTopology& topology = this->Motion->Topology();
-  double narrowest = std::numeric_limits<double>::infinity();
-  double along = 0.0;
-  const std::vector<Vector3>& axis = topology.axis[root];
-  const std::vector<double>* radius = static_cast<std::size_t>(root) < topology.axisRadius.size()
-    ? &topology.axisRadius[root]
-    : nullptr;
-  for (std::size_t i = 0; radius && i < axis.size() && i < radius->size(); ++i)
-  {
-    along += i > 0 ? (axis[i] - axis[i - 1]).norm() : 0.0;
-    if (along <= this->CatheterTip)
-    {
-      narrowest = std::min(narrowest, (*radius)[i]);
-    }
-  }
-  const auto refuse =
-    [](const std::string& what, double thick, const std::string& where, double room)
-  {
-    char text[256];
-    std::snprintf(text, sizeof(text), "%s is thicker (radius %.3f mm) than %s (radius %.3f mm)",
-      what.c_str(), thick, where.c_str(), room);
-    throw std::invalid_argument(text);
-  };
+  const double narrowest = NarrowestBefore(this->Motion->Topology(), root, this->CatheterTip);
   if (this->Catheter.outerRadius > narrowest)
   {
-    refuse("the catheter '" + this->Catheter.name + "'", this->Catheter.outerRadius,
-      "the lumen at the ostium", narrowest);
+    char text[256];
+    std::snprintf(text, sizeof(text),
+      "the catheter '%s' is thicker (radius %.3f mm) than the lumen at the ostium (radius %.3f mm)",
+      this->Catheter.name.c_str(), this->Catheter.outerRadius, narrowest);
+    throw std::invalid_argument(text);
   }
-  for (const WireSection& section : this->Wire.sections)
-  {
-    if (section.radius >= this->Catheter.innerRadius)
-    {
-      refuse("the wire '" + this->Wire.name + "'", section.radius,
-        "the inside of the catheter '" + this->Catheter.name + "'", this->Catheter.innerRadius);
-    }
-  }
+  RequireFit(this->Wire, this->Catheter);
 }
 
 /// Of the engaged tree, out of the whole wall's that come next.
@@ -536,6 +514,7 @@ void Intervention::Internals::BeginFrame()
     this->Rigid->SetAngle(this->CatheterAngle);
     this->Rigid->BeginFrame(this->RootAxis, this->FrameSeconds);
   }
+  this->Plugs.BeginFrame(this->Axis, this->FrameSeconds);
   this->TickInFrame = 0;
 }
 
@@ -841,7 +820,7 @@ void Intervention::Internals::Measure()
     report.maximumForce = std::max(report.maximumForce, force);
     report.maximumPenetration = std::max(report.maximumPenetration, depth);
     report.meanPenetration += depth;
-    if (this->Places[contact.segment] < 3.0)
+    if (this->Places[contact.segment] < 3.0 && !this->Plugs.Holds(contact))
     {
       report.tipForce += force;
     }
@@ -903,13 +882,9 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   data.MakeSegments();
   data.Motion->Positions(data.Phase, data.NextPoints);
   data.LastPoints = data.NextPoints;
-  RodSettings rod;
-  rod.mediumFollowsWalls = true;
-  rod.reach = 0.08; // a little less than `trust`: what comes nearer is seen in the next tick
-  rod.maximumMove = 1.0;
-  rod.trust = 0.1;
-  data.Rod = std::make_unique<CosseratRod>(settings.capacity, rod);
+  data.Rod = std::make_unique<CosseratRod>(NewRod(settings.capacity));
   data.Engage(data.NextPoints, data.Rod->SamplesPerSegment());
+  data.Plugs = OcclusionPlugs(data.Motion->Topology(), data.Axis);
   data.InVessel.assign(settings.capacity * data.Rod->SamplesPerSegment(), 0);
   data.Line.reserve(settings.capacity + 1);
   data.Last.position.reserve(settings.capacity);
@@ -942,6 +917,7 @@ const TickReport& Intervention::Step(const DriveInput& input)
   const double inFrame = data.Step * data.TickInFrame;
   data.Wall->SetTime(inFrame);
   data.Path->SetTime(inFrame);
+  data.Plugs.SetTime(inFrame);
   data.Phase += data.Step * data.Settings.heartRate / 60.0;
   data.Phase = Modulo(data.Phase);
   data.Drive(input);
@@ -958,6 +934,7 @@ const TickReport& Intervention::Step(const DriveInput& input)
   else
   {
     data.PutBack();
+    data.Report.capForce = data.Plugs.Press(*data.Rod);
     if (data.Tick % 200 == 0 && step.maximumGap < 0.05 && data.Report.outside == 0)
     {
       data.KeepSane();
@@ -1066,7 +1043,7 @@ std::uint64_t Intervention::StateHash() const
   {
     hash = Fnv1a(&value, sizeof(value), hash);
   }
-  hash = data.Behind.Hash(hash);
+  hash = data.Plugs.Hash(data.Behind.Hash(hash));
   hash = data.Free ? data.Free->Hash(hash) : hash;
   return data.Sleeve ? data.Opening->Hash(data.Sleeve->Hash(hash)) : hash;
 }
@@ -1169,6 +1146,37 @@ bool Intervention::Exchange(const BalloonCatheter& balloon)
   data.Inflator = 0.0;
   data.Report.balloon = data.Sleeve->Report();
   return true;
+}
+
+bool Intervention::Exchange(const Guidewire& wire)
+{
+  Internals& data = *this->Data;
+  RequireFit(wire, data.Catheter);
+  if (data.Fed > data.CatheterTip)
+  {
+    data.Say(Notice::WireNotExchanged);
+    return false;
+  }
+  data.Wire = wire;
+  data.MakeSegments();
+  data.Behind = WireInGuide(wire, data.Catheter, data.Settings.insideCatheter);
+  data.DriveBehind(); // how stiff it is, for how it rests
+  data.Behind.Rest(data.HandAngle, data.HandAngle);
+  data.DriveBehind();
+  *data.Rod = NewRod(data.Settings.capacity);
+  data.PlaceOnPath();
+  data.KeepSane();
+  return true;
+}
+
+const Guidewire& Intervention::Wire() const
+{
+  return this->Data->Wire;
+}
+
+const std::vector<OcclusionPlug>& Intervention::Plugs() const
+{
+  return this->Data->Plugs.All();
 }
 
 std::vector<std::string> Intervention::TakeMessages()

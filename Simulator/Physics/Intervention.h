@@ -10,6 +10,7 @@
 #include "Geometry.h"
 #include "GuideInAorta.h"
 #include "Instrument.h"
+#include "OcclusionPlug.h"
 
 #include <cstdint>
 #include <memory>
@@ -57,11 +58,12 @@ struct TickReport
   double catheterTip =
     0.0;          ///< mm of the catheter beyond the ostium; negative: in the aorta, so far from it
   GuideSeat seat; ///< of a catheter from the arch
-  double proximalForce = 0.0;      ///< N, against advancing
-  double proximalTorque = 0.0;     ///< N mm, against turning
-  double tipForce = 0.0;           ///< N between the wire's last 3 mm and the wall
-  double maximumForce = 0.0;       ///< N of a sample's contact
-  int contacts = 0;                ///< samples that press on the wall
+  double proximalForce = 0.0;  ///< N, against advancing
+  double proximalTorque = 0.0; ///< N mm, against turning
+  double tipForce = 0.0;     ///< N between the wire's last 3 mm and the wall, but for an occlusion
+  double capForce = 0.0;     ///< N of the wire's tip on the tissue of an occlusion
+  double maximumForce = 0.0; ///< N of a sample's contact
+  int contacts = 0;          ///< samples that press on the wall
   double maximumPenetration = 0.0; ///< mm into the wall
   double meanPenetration = 0.0;    ///< mm, over the samples that touch
   double jointGap = 0.0;           ///< mm, greatest
@@ -77,9 +79,6 @@ struct StentShape
   std::vector<Vector3> line; ///< mm, from its end near the ostium on
   std::vector<double> radii; ///< mm, inside
 };
-
-/// @throws std::invalid_argument  naming balloon and property; a balloon that does not fit into the catheter
-void RequireFit(const BalloonCatheter& balloon, const GuideCatheter& catheter);
 
 /**
  * Runs at a fixed step, on one thread, and allocates nothing after the first ticks. The same binary,
@@ -136,6 +135,13 @@ public:
    * @throws as RequireFit; std::logic_error: there is no balloon in this session
    */
   bool Exchange(const BalloonCatheter& balloon);
+  /// Another wire in place of this one, likewise, its tip where this one's was: both turned as the hand is, and at rest.
+  /// @return false: this one is not wholly in the guide; a message says so
+  bool Exchange(const Guidewire& wire);
+
+  const Guidewire& Wire() const;
+  /// Tissue that fills vessels, and how far it was crossed.
+  const std::vector<OcclusionPlug>& Plugs() const;
 
   /// FNV-1a over the bits of the wire's, the balloon's, the stents', the hands' and the heart's state. What the wall keeps to be faster, and the
   /// forces in the joints, follow from these and the ticks before.

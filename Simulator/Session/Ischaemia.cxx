@@ -12,6 +12,7 @@ constexpr double ShiftOfAll = 1.0;  // mV, of a whole heart without blood
 constexpr double OnsetTime = 66.0;  // s: 0.1 of 0.4 mV after 19 s
 constexpr double ReturnTime = 14.4; // s: from 0.4 back to 0.1 mV in 20 s
 constexpr double Shortage = 0.02;   // of what a tip needs: less is none
+constexpr double Collateral = 0.02; // of the healthy flow: a tip that had less lives of others
 }
 
 Ischaemia::Ischaemia(const CoronaryFlow& flow)
@@ -28,7 +29,8 @@ Ischaemia::Ischaemia(const CoronaryFlow& flow)
       tip.node = static_cast<int>(n);
       tip.branch = network.Segments()[network.Nodes()[n].above].branch;
       tip.share = healthy[n];
-      tip.needs = std::min(CoronaryFlow::LeastSupply, now[n] / healthy[n]);
+      const double before = now[n] / healthy[n];
+      tip.needs = before < Collateral ? 0.0 : std::min(CoronaryFlow::LeastSupply, before);
       all += tip.share;
       this->Tips.push_back(tip);
     }

@@ -46,6 +46,7 @@ const char* NameOf(ProcedureEvent::Kind kind, const char*& quantity)
 
 LesionWatch::LesionWatch(const WallTopology& topology, const ContrastModel& medium)
   : Reference(ReferenceRadii(topology))
+  , Closed(ClosedRadii(topology))
   , Names(topology.groupName)
 {
   for (std::size_t b = 0; b < topology.axis.size(); ++b)
@@ -382,10 +383,11 @@ std::vector<LesionResult> LesionWatch::Results(
       for (const std::int64_t point : one.lesion.points)
       {
         const int branch = this->BranchOf(point);
+        const std::int64_t k = point - this->First[branch];
         const double radius = wall->Radii()[point];
-        result.degree = std::max(
-          result.degree, 1.0 - radius / this->Reference[branch][point - this->First[branch]]);
-        result.least = std::min(result.least, 2.0 * radius);
+        const double open = radius > this->Closed[branch][k] ? radius : 0.0;
+        result.degree = std::max(result.degree, 1.0 - open / this->Reference[branch][k]);
+        result.least = std::min(result.least, 2.0 * open);
       }
     }
     result.pressureRatio = one.meanAortic > 0.0 ? one.meanDistal / one.meanAortic : 0.0;

@@ -23,7 +23,7 @@ struct LesionResult
   int branch = 0;             ///< with the narrowest place
   double reference = 0.0;     ///< mm, diameter without the lesion at its narrowest place
   double least = 0.0;         ///< mm, diameter now
-  double degreeBefore = 0.0;  ///< of the diameter, when the session began
+  double degreeBefore = 0.0;  ///< of the diameter, when the session began; 1: occluded
   double degree = 0.0;        ///< now; after a dilation the residual stenosis
   double pressureRatio = 0.0; ///< Pd / Pa, means over about two seconds
   double reserveBefore = 0.0; ///< FFR when the session began
@@ -128,6 +128,7 @@ private:
   bool FlowIsNew_ = false;
   std::vector<std::int64_t> First;            ///< point of each branch
   std::vector<std::vector<double>> Reference; ///< mm, radii
+  std::vector<std::vector<double>> Closed;    ///< mm, ClosedRadii
   std::vector<std::string> Names;             ///< of branches
   std::vector<double>
     Resting; ///< mm, per point of the axes in one list: of the lumen without a balloon

@@ -21,8 +21,9 @@ constexpr double IschaemiaFree = 60.0; // s
 
 bool IsOfLesion(Goal goal)
 {
-  return goal == Goal::WireBeyondLesion || goal == Goal::BalloonInLesion ||
-    goal == Goal::StentInLesion || goal == Goal::StenosisBelow || goal == Goal::ReserveAbove;
+  return goal == Goal::WireAtLesion || goal == Goal::WireBeyondLesion ||
+    goal == Goal::BalloonInLesion || goal == Goal::StentInLesion || goal == Goal::StenosisBelow ||
+    goal == Goal::ReserveAbove;
 }
 
 bool NeedsBalloon(Goal goal)
@@ -144,6 +145,11 @@ bool ProcedureWatch::Reached(const ProcedureMoment& moment,
         }
       }
       return false;
+    case Goal::WireAtLesion:
+      return this->IsBehind(lesion->branch, report.branch) &&
+        report.catheterTip + report.inserted >= lesion->from - step.value;
+    case Goal::WireTaken:
+      return static_cast<double>(moment.wire) == step.value;
     case Goal::WireBeyondLesion:
       return this->IsBehind(report.branch, lesion->branch) &&
         report.catheterTip + report.inserted - lesion->to >= step.value;

@@ -34,6 +34,7 @@ struct ProcedureMoment
   bool cine = false;     ///< radiating
   std::int64_t run = 0;  ///< cine runs that were begun
   double injected = 0.0; ///< mL
+  std::size_t wire = 0;  ///< number of the wire in use, as WireOf
 };
 
 class ProcedureWatch

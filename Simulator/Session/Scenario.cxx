@@ -36,7 +36,9 @@ struct GoalName
 constexpr GoalName GoalNames[] = { { ProcedureStep::Goal::Angiogram, "angiogram", "views", 1.0,
                                      20.0 },
   { ProcedureStep::Goal::WireIn, "wire_in", nullptr, 0.0, 0.0 },
+  { ProcedureStep::Goal::WireAtLesion, "wire_at_lesion", "mm", 0.0, 50.0 },
   { ProcedureStep::Goal::WireBeyondLesion, "wire_beyond_lesion", "mm", 0.0, 200.0 },
+  { ProcedureStep::Goal::WireTaken, "wire_taken", "number", 0.0, 100.0 },
   { ProcedureStep::Goal::BalloonInLesion, "balloon_in_lesion", "atm", 0.5, 40.0 },
   { ProcedureStep::Goal::StentInLesion, "stent_in_lesion", nullptr, 0.0, 0.0 },
   { ProcedureStep::Goal::StenosisBelow, "stenosis_below", "percent", 1.0, 100.0 },
@@ -435,8 +437,17 @@ VesselLesion LesionOf(const Json& object, const std::string& where)
   lesion.vessel = fields.Text("vessel");
   lesion.place = fields.Number("at_mm", 0.0, 500.0);
   lesion.length = fields.Number("length_mm", 2.0, 60.0, lesion.length);
-  lesion.degree = fields.Number("degree", 0.0, 0.95);
+  lesion.degree = fields.Number("degree", 0.0, 1.0);
   lesion.calciumArc = fields.Number("calcium_arc_deg", 0.0, 360.0, 0.0);
+  if (lesion.degree > 0.95 && lesion.degree < 1.0)
+  {
+    fields.Refuse("has 'degree' above 0.95 that is not 1, an occlusion");
+  }
+  if (lesion.degree < 1.0 && fields.Has("cap_MPa"))
+  {
+    fields.Refuse("has 'cap_MPa', which only an occlusion has ('degree' 1)");
+  }
+  lesion.strength = fields.Number("cap_MPa", 0.1, 100.0, lesion.strength);
   fields.Done();
   return lesion;
 }
@@ -461,7 +472,7 @@ ProcedureStep StepOf(const Json& object, const std::string& where)
   step.goal = goal->goal;
   step.vessel = step.goal == ProcedureStep::Goal::WireIn ? fields.Text("vessel")
     : step.goal == ProcedureStep::Goal::Angiogram || step.goal == ProcedureStep::Goal::WireBack ||
-      step.goal == ProcedureStep::Goal::GuideIn
+      step.goal == ProcedureStep::Goal::GuideIn || step.goal == ProcedureStep::Goal::WireTaken
     ? ""
     : fields.Text("vessel", "");
   if (goal->value)
@@ -549,9 +560,19 @@ Scenario ScenarioFromText(
   };
   const auto byName = [&](const char* what, const auto& find)
   { return named(fields.Text(what), find); };
-  scenario.wire = fields.Any("wire").is_string()
-    ? byName("wire", [&](const std::string& name) { return catalogue->Wire(name).wire; })
-    : WireFromJson(fields.Object("wire"), origin).wire;
+  const auto wireOf = [&](const Json& entry)
+  {
+    return entry.is_string()
+      ? named(entry.get<std::string>(),
+          [&](const std::string& name) { return catalogue->Wire(name).wire; })
+      : WireFromJson(entry, origin).wire;
+  };
+  const Json none = Json::array();
+  scenario.wire = wireOf(fields.Any("wire"));
+  for (const Json& entry : fields.Has("wire_exchanges") ? fields.List("wire_exchanges") : none)
+  {
+    scenario.wireExchanges.push_back(wireOf(entry));
+  }
   scenario.catheter = fields.Any("catheter").is_string()
     ? byName(
         "catheter", [&](const std::string& name) { return catalogue->Catheter(name).catheter; })
@@ -567,7 +588,6 @@ Scenario ScenarioFromText(
   {
     scenario.balloon = balloonOf(fields.Any("balloon"));
   }
-  const Json none = Json::array();
   for (const Json& entry : fields.Has("exchanges") ? fields.List("exchanges") : none)
   {
     scenario.exchanges.push_back(balloonOf(entry));
@@ -585,6 +605,14 @@ Scenario ScenarioFromText(
   {
     scenario.procedure.push_back(
       StepOf(entry, origin + ", step " + std::to_string(scenario.procedure.size() + 1)));
+  }
+  for (const ProcedureStep& step : scenario.procedure)
+  {
+    const bool taken = step.goal == ProcedureStep::Goal::WireTaken;
+    if (taken && !WireOf(scenario, static_cast<std::size_t>(step.value)))
+    {
+      fields.Refuse("has a step '" + step.text + "' that takes a wire that it has not");
+    }
   }
   const auto part = [&](const char* name)
   { return fields.Has(name) ? fields.Object(name) : Json::object(); };
@@ -606,6 +634,10 @@ std::string ScenarioText(const Scenario& scenario)
     { "settings", SettingsToJson(scenario.settings) },
     { "imaging", ImagingToJson(scenario.imaging) },
     { "contrast", ContrastToJson(scenario.contrast) }, { "seed", scenario.seed } };
+  for (const Guidewire& wire : scenario.wireExchanges)
+  {
+    json["wire_exchanges"].push_back(WireToJson(wire));
+  }
   if (scenario.balloon)
   {
     json["balloon"] = BalloonToJson(*scenario.balloon);
@@ -619,6 +651,10 @@ std::string ScenarioText(const Scenario& scenario)
     json["lesions"].push_back(
       { { "vessel", lesion.vessel }, { "at_mm", lesion.place }, { "length_mm", lesion.length },
         { "degree", lesion.degree }, { "calcium_arc_deg", lesion.calciumArc } });
+    if (lesion.degree == 1.0)
+    {
+      json["lesions"].back()["cap_MPa"] = lesion.strength;
+    }
   }
   for (const ProcedureStep& step : scenario.procedure)
   {
@@ -634,6 +670,15 @@ const BalloonCatheter* BalloonOf(const Scenario& scenario, std::size_t number)
     return scenario.balloon ? &*scenario.balloon : nullptr;
   }
   return number <= scenario.exchanges.size() ? &scenario.exchanges[number - 1] : nullptr;
+}
+
+const Guidewire* WireOf(const Scenario& scenario, std::size_t number)
+{
+  if (number == 0)
+  {
+    return &scenario.wire;
+  }
+  return number <= scenario.wireExchanges.size() ? &scenario.wireExchanges[number - 1] : nullptr;
 }
 
 std::vector<BuiltInScenario> BuiltInScenarios()

@@ -45,10 +45,12 @@ struct ProcedureStep
 {
   enum class Goal
   {
-    Angiogram, ///< value: cine runs with contrast medium, from views at least 25 degrees apart
-    GuideIn,   ///< the guide catheter's tip is in the ostium
-    WireIn,    ///< the wire's tip is in `vessel`, or behind it
+    Angiogram,    ///< value: cine runs with contrast medium, from views at least 25 degrees apart
+    GuideIn,      ///< the guide catheter's tip is in the ostium
+    WireIn,       ///< the wire's tip is in `vessel`, or behind it
+    WireAtLesion, ///< value: mm before the lesion's beginning, at most, on the way to it
     WireBeyondLesion, ///< value: mm of wire behind the lesion
+    WireTaken,        ///< value: number of the wire, as WireOf
     BalloonInLesion,  ///< value: atm of a balloon whose middle is in the lesion
     StentInLesion,    ///< a stent is in it
     StenosisBelow,    ///< value: per cent of the diameter, without an open balloon
@@ -71,6 +73,7 @@ struct Scenario
   VesselSource vessels;
   std::string artery = "LCA"; ///< LCA, RCA, or "any": the first root
   Guidewire wire;
+  std::vector<Guidewire> wireExchanges; ///< for it, in their order
   GuideCatheter catheter;
   std::optional<BalloonCatheter> balloon; ///< none: the session has none
   std::vector<BalloonCatheter> exchanges; ///< for it, in their order; none without a balloon
@@ -92,6 +95,8 @@ Scenario ScenarioFromText(
 
 /// @param number  0: the session begins with it; else of its exchanges; null: there is none
 const BalloonCatheter* BalloonOf(const Scenario& scenario, std::size_t number);
+/// Likewise.
+const Guidewire* WireOf(const Scenario& scenario, std::size_t number);
 
 /// JSON that says everything, the instruments' values included; reading it gives the same bits.
 std::string ScenarioText(const Scenario& scenario);

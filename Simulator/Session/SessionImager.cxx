@@ -346,14 +346,15 @@ InstrumentChain SessionImager::WireOf(const SessionSnapshot& snapshot) const
       wire.points.push_back(snapshot.catheter[n]);
     }
   }
+  const Guidewire& device = *coronary::WireOf(this->Scenario_, snapshot.wireNumber);
   double along = 0.0;
   for (std::size_t n = 0; n + 1 < wire.points.size(); ++n)
   {
     const double length = (wire.points[n + 1] - wire.points[n]).norm();
     const double middle = along + 0.5 * length;
     InstrumentSegment segment;
-    segment.outerRadius = AlongWire(
-      this->Scenario_.wire, middle, [](const WireSection& section) { return section.radius; });
+    segment.outerRadius =
+      AlongWire(device, middle, [](const WireSection& section) { return section.radius; });
     // The coil of the tip is a tube of platinum wire, about a third of its radius thick.
     const bool coil = middle < CoilLength;
     segment.innerRadius = coil ? 0.65 * segment.outerRadius : 0.0;

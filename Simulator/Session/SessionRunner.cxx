@@ -23,6 +23,10 @@ std::vector<RecordedEvent> EventsOf(const DriveScript& script, double from, doub
   {
     events.push_back({ RecordedEvent::Exchange, number });
   }
+  for (const double number : script.WireExchanges(from, to))
+  {
+    events.push_back({ RecordedEvent::ExchangeWire, number });
+  }
   return events;
 }
 

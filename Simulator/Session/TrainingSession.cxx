@@ -93,6 +93,11 @@ struct TrainingSession::Internals
       RequireFit(*one, scenario.catheter);
       this->Balloons.push_back(*one);
     }
+    for (std::size_t n = 0; const Guidewire* one = WireOf(scenario, n); ++n)
+    {
+      RequireFit(*one, scenario.catheter);
+      this->Wires.push_back(*one);
+    }
   }
 
   void SetView(const SessionInput& input);
@@ -111,7 +116,9 @@ struct TrainingSession::Internals
       ? this->Medium.FlowModel().PressureAt({ this->Settings.rootBranch, tick.catheterTip })
       : this->Medium.AorticPressure();
   }
-  bool Exchange(double number);
+  template <typename Instrument>
+  bool Exchange(
+    double number, const std::vector<Instrument>& list, std::size_t& inUse, const char* what);
 
   std::shared_ptr<WallMotion> Wall;
   InterventionSettings Settings;
@@ -132,6 +139,8 @@ struct TrainingSession::Internals
   ///@}
   std::vector<BalloonCatheter> Balloons;
   std::size_t BalloonNumber = 0;
+  std::vector<Guidewire> Wires;
+  std::size_t WireNumber = 0;
   ExposureClock Clock;
   double HeartRate;
   std::uint64_t TicksOfContrast;
@@ -336,28 +345,31 @@ void TrainingSession::Internals::StepProcedure()
   const bool lesions = this->Procedure->NeedsLesions();
   this->Procedure->Step({ this->Report.tick, this->Metrics, this->Pose,
                           this->Clock.Radiating() && this->Clock.Last().cine, this->Clock.Runs(),
-                          this->Medium.Balance().injected },
+                          this->Medium.Balance().injected, this->WireNumber },
     lesions ? this->Watch.Results(this->Physics, this->Medium) : std::vector<LesionResult>(),
     lesions ? this->Watch.Stents(this->Physics) : std::vector<StentResult>(), this->Messages);
 }
 
-bool TrainingSession::Internals::Exchange(double number)
+/// @param number  in `list`, becomes `inUse`  @return false: there is none
+template <typename Instrument>
+bool TrainingSession::Internals::Exchange(
+  double number, const std::vector<Instrument>& list, std::size_t& inUse, const char* what)
 {
-  const bool known = number >= 0.0 && number < static_cast<double>(this->Balloons.size()) &&
-    number == std::floor(number);
+  const bool known =
+    number >= 0.0 && number < static_cast<double>(list.size()) && number == std::floor(number);
   if (!known)
   {
     char text[120];
-    std::snprintf(text, sizeof(text), "There is no balloon number %g: the scenario has %zu.",
-      number, this->Balloons.size());
+    std::snprintf(text, sizeof(text), "There is no %s number %g: the scenario has %zu.", what,
+      number, list.size());
     this->Messages.emplace_back(text);
     return false;
   }
   const auto wanted = static_cast<std::size_t>(number);
-  if (this->Physics.Exchange(this->Balloons[wanted]))
+  if (this->Physics.Exchange(list[wanted]))
   {
-    this->BalloonNumber = wanted;
-    this->Messages.push_back("The balloon '" + this->Balloons[wanted].name + "' is taken.");
+    inUse = wanted;
+    this->Messages.push_back(std::string("The ") + what + " '" + list[wanted].name + "' is taken.");
   }
   return true;
 }
@@ -446,7 +458,9 @@ bool TrainingSession::Apply(const RecordedEvent& event)
       data.SetField();
       return true;
     case RecordedEvent::Exchange:
-      return data.Exchange(event.value);
+      return data.Exchange(event.value, data.Balloons, data.BalloonNumber, "balloon");
+    case RecordedEvent::ExchangeWire:
+      return data.Exchange(event.value, data.Wires, data.WireNumber, "wire");
     default:
       return false;
   }
@@ -565,6 +579,7 @@ void TrainingSession::SnapshotOfImage(SessionSnapshot& snapshot) const
   snapshot.radiating = data.Clock.Radiating();
   snapshot.exposure = data.Clock.Last();
   snapshot.wire = data.Physics.Centerline();
+  snapshot.wireNumber = data.WireNumber;
   snapshot.catheter = data.Physics.CatheterLine();
   snapshot.guideFromArch = data.Settings.guideFromArch;
   data.Wall->AxisPositions(data.Report.tick.phase, snapshot.axis);

@@ -49,6 +49,7 @@ struct SessionSnapshot
   double frameRate = 0.0;   ///< Hz, of fluoroscopy
   bool radiating = false;
   Exposure exposure;                 ///< the last one
+  std::size_t wireNumber = 0;        ///< as WireOf
   std::vector<Vector3> wire;         ///< from its tip, mm
   std::vector<Vector3> catheter;     ///< from its tip, mm
   bool guideFromArch = false;        ///< it lies in the aorta, which is to be seen

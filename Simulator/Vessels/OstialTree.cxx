@@ -33,6 +33,27 @@ int RootOf(const WallTopology& topology, int wanted)
   return root;
 }
 
+double NarrowestBefore(const WallTopology& topology, int branch, double along)
+{
+  double narrowest = std::numeric_limits<double>::infinity();
+  if (static_cast<std::size_t>(branch) >= topology.axisRadius.size())
+  {
+    return narrowest;
+  }
+  const std::vector<Vector3>& axis = topology.axis[branch];
+  const std::vector<double>& radius = topology.axisRadius[branch];
+  double passed = 0.0;
+  for (std::size_t i = 0; i < axis.size() && i < radius.size(); ++i)
+  {
+    passed += i > 0 ? (axis[i] - axis[i - 1]).norm() : 0.0;
+    if (passed <= along)
+    {
+      narrowest = std::min(narrowest, radius[i]);
+    }
+  }
+  return narrowest;
+}
+
 OstialTree MakeOstialTree(const WallTopology& topology, const std::vector<Vector3>& points,
   const Vector3& ostium, const Vector3& tip)
 {

@@ -16,6 +16,9 @@ namespace coronary
 /// @throws std::invalid_argument  there is no axis, or no such branch
 int RootOf(const WallTopology& topology, int wanted);
 
+/// mm, the least radius of a branch on its first `along` mm; infinite where no radii are known.
+double NarrowestBefore(const WallTopology& topology, int branch, double along);
+
 /// What is connected with the place where a catheter's tip is: no instrument comes to other vessels.
 struct OstialTree
 {

@@ -17,6 +17,7 @@ constexpr double LookAhead = 5.0;  // mm behind a bifurcation, where a branch ha
 // Parent's radii along a side branch: up to there the wall is the parent's, from there on its own.
 constexpr double MouthBegins = 1.0;
 constexpr double MouthEnds = 3.0;
+constexpr double Stump = 3.0; // mm on which a vessel narrows to its occlusion
 
 double RadiusAhead(const WallTopology& topology, int branch)
 {
@@ -45,6 +46,52 @@ void RequireLesion(
   {
     throw std::invalid_argument("The lesion of '" + lesion.vessel + "' has " + what + " of " +
       std::to_string(value) + ", not " + std::to_string(low) + " to " + std::to_string(high) + ".");
+  }
+}
+
+void RequireLesion(const VesselLesion& lesion)
+{
+  const bool occludes = lesion.degree == 1.0;
+  RequireLesion(lesion, lesion.length, occludes ? 4.0 : 2.0, 60.0, "a length (mm)");
+  if (!occludes)
+  {
+    RequireLesion(lesion, lesion.degree, 0.0, 0.95, "a degree (other than 1)");
+  }
+  RequireLesion(lesion, lesion.calciumArc, 0.0, 360.0, "a calcium arc (degrees)");
+  RequireLesion(lesion, lesion.strength, 0.1, 100.0, "a strength of its cap (MPa)");
+}
+
+/// Of an occlusion: how far the vessel is narrowed to its channel; 1: tissue fills it. @param away  of the length
+double FilledShare(const VesselLesion& lesion, double away)
+{
+  const double inside = (0.5 - std::abs(away)) * lesion.length; // mm from its nearer end
+  return SmoothStep(inside / std::min(Stump, 0.25 * lesion.length));
+}
+
+bool IsOccluded(const WallTopology& topology, int branch, std::size_t k)
+{
+  return !topology.axisOcclusion.empty() && topology.axisOcclusion[branch][k] > 0.0;
+}
+
+/// Points of what is one vessel, from where it begins. @param visit  branch, point  @param end  after the last one
+template <typename Visit, typename End>
+void AlongVessels(const WallTopology& topology, const Visit& visit, const End& end)
+{
+  for (std::size_t root = 0; root < topology.axis.size(); ++root)
+  {
+    const int parent = topology.parent[root];
+    if (parent >= 0 && GoesOnAs(topology, parent) == static_cast<int>(root))
+    {
+      continue; // looked through with its parent
+    }
+    for (int b = static_cast<int>(root); b >= 0; b = GoesOnAs(topology, b))
+    {
+      for (std::size_t k = 0; k < topology.axis[b].size(); ++k)
+      {
+        visit(b, k);
+      }
+    }
+    end();
   }
 }
 }
@@ -150,48 +197,85 @@ std::vector<FoundLesion> FindLesions(const WallTopology& topology, double least)
 {
   const std::vector<std::vector<double>> reference = ReferenceRadii(topology);
   std::vector<FoundLesion> lesions;
-  for (std::size_t root = 0; root < topology.axis.size(); ++root)
+  FoundLesion lesion;
+  const auto close = [&]
   {
-    const int parent = topology.parent[root];
-    if (parent >= 0 && GoesOnAs(topology, parent) == static_cast<int>(root))
+    if (lesion.degree >= least)
     {
-      continue; // looked through with its parent
+      lesions.push_back(lesion);
     }
-    FoundLesion lesion;
-    const auto close = [&]
+    lesion = FoundLesion();
+  };
+  AlongVessels(
+    topology,
+    [&](int b, std::size_t k)
     {
-      if (lesion.degree >= least)
+      const double degree =
+        IsOccluded(topology, b, k) ? 1.0 : 1.0 - topology.axisRadius[b][k] / reference[b][k];
+      if (degree < LesionEdge)
       {
-        lesions.push_back(lesion);
+        close();
+        return;
       }
-      lesion = FoundLesion();
-    };
-    for (int b = static_cast<int>(root); b >= 0; b = GoesOnAs(topology, b))
-    {
-      const std::int64_t first = FirstAxisPoint(topology, b);
-      for (std::size_t k = 0; k < topology.axis[b].size(); ++k)
+      const std::int64_t point = FirstAxisPoint(topology, b) + static_cast<std::int64_t>(k);
+      lesion.points.push_back(point);
+      if (degree > lesion.degree)
       {
-        const double degree = 1.0 - topology.axisRadius[b][k] / reference[b][k];
-        if (degree < LesionEdge)
-        {
-          close();
-          continue;
-        }
-        const std::int64_t point = first + static_cast<std::int64_t>(k);
-        lesion.points.push_back(point);
-        if (degree > lesion.degree)
-        {
-          lesion.degree = degree;
-          lesion.throat = point;
-          lesion.branch = b;
-          lesion.vessel =
-            static_cast<std::size_t>(b) < topology.groupName.size() ? topology.groupName[b] : "";
-        }
+        lesion.degree = degree;
+        lesion.throat = point;
+        lesion.branch = b;
+        lesion.vessel =
+          static_cast<std::size_t>(b) < topology.groupName.size() ? topology.groupName[b] : "";
       }
-    }
-    close();
-  }
+    },
+    close);
   return lesions;
+}
+
+std::vector<Occlusion> FindOcclusions(const WallTopology& topology)
+{
+  std::vector<Occlusion> occlusions;
+  Occlusion occlusion;
+  Vector3 last = Vector3::Zero();
+  const auto close = [&]
+  {
+    if (occlusion.points.size() > 1)
+    {
+      occlusions.push_back(occlusion);
+    }
+    occlusion = Occlusion();
+  };
+  AlongVessels(
+    topology,
+    [&](int b, std::size_t k)
+    {
+      if (!IsOccluded(topology, b, k))
+      {
+        close();
+        return;
+      }
+      const Vector3& here = topology.axis[b][k];
+      const bool first = occlusion.points.empty();
+      occlusion.strength = first ? topology.axisOcclusion[b][k] : occlusion.strength;
+      occlusion.places.push_back(first ? 0.0 : occlusion.places.back() + (here - last).norm());
+      occlusion.points.push_back(FirstAxisPoint(topology, b) + static_cast<std::int64_t>(k));
+      last = here;
+    },
+    close);
+  return occlusions;
+}
+
+std::vector<std::vector<double>> ClosedRadii(const WallTopology& topology)
+{
+  std::vector<std::vector<double>> closed = topology.axisRadius;
+  for (std::size_t b = 0; b < closed.size(); ++b)
+  {
+    for (std::size_t k = 0; k < closed[b].size(); ++k)
+    {
+      closed[b][k] = IsOccluded(topology, static_cast<int>(b), k) ? closed[b][k] : 0.0;
+    }
+  }
+  return closed;
 }
 
 WallSections::Place WallSections::Nearest(const Vector3& point, const std::vector<Vector3>& axis,
@@ -325,9 +409,7 @@ NarrowedWallMotion::NarrowedWallMotion(
 
 void NarrowedWallMotion::Narrow(const VesselLesion& lesion)
 {
-  RequireLesion(lesion, lesion.length, 2.0, 60.0, "a length (mm)");
-  RequireLesion(lesion, lesion.degree, 0.0, 0.95, "a degree");
-  RequireLesion(lesion, lesion.calciumArc, 0.0, 360.0, "a calcium arc (degrees)");
+  RequireLesion(lesion);
   const WallTopology& topology = this->Topology_;
   // Parts of a segment between its side branches are one vessel.
   int branch = -1;
@@ -357,6 +439,15 @@ void NarrowedWallMotion::Narrow(const VesselLesion& lesion)
   const double length = way.place[end - 1] - way.place[begin];
   RequireLesion(lesion, lesion.place, 0.0, length, "a place (mm) in it");
   const double middle = way.place[begin] + lesion.place;
+  const bool occludes = lesion.degree == 1.0;
+  if (occludes && topology.axisOcclusion.empty())
+  {
+    for (const std::vector<double>& radius : topology.axisRadius)
+    {
+      this->Topology_.axisOcclusion.emplace_back(radius.size(), 0.0);
+    }
+  }
+  int filled = 0;
   for (std::size_t n = 0; n < way.points.size(); ++n)
   {
     const double away = (way.place[n] - middle) / lesion.length;
@@ -365,12 +456,26 @@ void NarrowedWallMotion::Narrow(const VesselLesion& lesion)
       continue;
     }
     const double wave = std::cos(Pi * away);
-    const double open = 1.0 - lesion.degree * wave * wave;
+    double open = 1.0 - lesion.degree * wave * wave;
     const int b = way.branch[n];
     const auto k = static_cast<std::size_t>(way.points[n] - FirstAxisPoint(topology, b));
+    if (occludes)
+    {
+      const double radius = topology.axisRadius[b][k];
+      RequireLesion(lesion, radius, 1.5 * ChannelRadius, 100.0, "a vessel with a radius (mm)");
+      const double share = FilledShare(lesion, away);
+      open = 1.0 - share * (1.0 - ChannelRadius / radius);
+      this->Topology_.axisOcclusion[b][k] = share < 1.0 ? 0.0 : lesion.strength;
+      filled += share < 1.0 ? 0 : 1;
+    }
     this->Ratio[way.points[n]] *= open;
     this->Topology_.axisRadius[b][k] *= open;
     this->Topology_.axisCalcium[b][k] = std::max(topology.axisCalcium[b][k], lesion.calciumArc);
+  }
+  if (occludes && filled < 2)
+  {
+    throw std::invalid_argument("The lesion of '" + lesion.vessel +
+      "' is too short to occlude it: its axis has less than two points there.");
   }
 }
 

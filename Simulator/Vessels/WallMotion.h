@@ -38,6 +38,8 @@ struct WallTopology
   std::vector<std::vector<double>> axisReference;
   /// Degrees of the section that calcium takes, as axis; empty: none.
   std::vector<std::vector<double>> axisCalcium;
+  /// MPa that the tissue bears which fills the vessel there, as axis; 0: open. Empty: no vessel is occluded.
+  std::vector<std::vector<double>> axisOcclusion;
   std::shared_ptr<const AortaAtRest> aorta; ///< null: not known
 };
 

@@ -85,26 +85,39 @@ InstrumentPanel::InstrumentPanel()
   form->addRow("Catheter", this->Catheter);
   form->addRow("", this->FromArch);
   form->addRow("Balloon", this->Balloon);
-  form->addRow(this->Next);
+  form->addRow(this->NextWire.button);
+  form->addRow(this->NextBalloon.button);
   form->addRow(this->Text);
-  QObject::connect(this->Next, &QPushButton::clicked,
-    [this]
-    {
-      const std::size_t next = (this->InUse + 1) % this->Balloons.size();
-      this->chosen({ RecordedEvent::Exchange, static_cast<double>(next) });
-    });
+  this->NextWire.button->setToolTip("Once the wire is drawn back into the guide catheter");
+  this->NextBalloon.button->setToolTip(
+    "Once the balloon is empty and wholly in the guide catheter");
+  const auto exchanges = [this](const NextButton& next, RecordedEvent::Kind kind)
+  {
+    QObject::connect(next.button, &QPushButton::clicked,
+      [this, &next, kind] {
+        this->chosen({ kind, static_cast<double>(next.Next()) });
+      });
+  };
+  exchanges(this->NextWire, RecordedEvent::ExchangeWire);
+  exchanges(this->NextBalloon, RecordedEvent::Exchange);
 }
 
-/// The balloon that an exchange takes: the next of the scenario's, after the last one the first.
-void InstrumentPanel::ShowNext()
+void InstrumentPanel::NextButton::Show() const
 {
-  const std::size_t count = this->Balloons.size();
-  this->Next->setVisible(count > 1);
-  if (count > 1)
+  const bool has = this->names.size() > 1;
+  this->button->setVisible(has);
+  if (has)
   {
-    this->Next->setText(
-      "Exchange for " + QString::fromStdString(this->Balloons[(this->InUse + 1) % count]));
-    this->Next->setToolTip("Once the balloon is empty and wholly in the guide catheter");
+    this->button->setText("Exchange for " + QString::fromStdString(this->names[this->Next()]));
+  }
+}
+
+void InstrumentPanel::NextButton::Use(std::size_t number)
+{
+  if (number != this->inUse)
+  {
+    this->inUse = number;
+    this->Show();
   }
 }
 
@@ -116,29 +129,34 @@ void InstrumentPanel::ShowScenario(const Scenario& scenario, bool aorta)
   Choose(*this->Catheter, QString::fromStdString(scenario.catheter.name), {});
   Choose(*this->Balloon,
     scenario.balloon ? QString::fromStdString(scenario.balloon->name) : QString(NoBalloon), {});
-  this->Balloons.clear();
+  this->NextWire.names.clear();
+  for (std::size_t n = 0; const Guidewire* one = WireOf(scenario, n); ++n)
+  {
+    this->NextWire.names.push_back(one->name);
+  }
+  this->NextBalloon.names.clear();
   for (std::size_t n = 0; const BalloonCatheter* one = BalloonOf(scenario, n); ++n)
   {
-    this->Balloons.push_back(one->name);
+    this->NextBalloon.names.push_back(one->name);
   }
-  this->InUse = 0;
-  this->ShowNext();
+  for (NextButton* next : { &this->NextWire, &this->NextBalloon })
+  {
+    next->inUse = 0;
+    next->Show();
+  }
 }
 
 void InstrumentPanel::ShowMoment(const SessionSnapshot& moment, const WallTopology& topology)
 {
   const TickReport& report = moment.report;
-  if (moment.balloonNumber != this->InUse)
-  {
-    this->InUse = moment.balloonNumber;
-    this->ShowNext();
-  }
+  this->NextWire.Use(moment.wireNumber);
+  this->NextBalloon.Use(moment.balloonNumber);
   this->Text->setText(QString("Beyond the catheter  %1 mm, in %2\n%3\n"
                               "Hand  %4 N, %5 N mm    Tip  %6 N")
                         .arg(Decimal(report.inserted, 1), BranchName(topology, report.branch),
                           TextOfCatheter(report), Decimal(report.proximalForce, 2),
                           Decimal(report.proximalTorque, 2), Decimal(report.tipForce, 2)) +
-    TextOfBalloon(moment, !this->Balloons.empty()));
+    TextOfBalloon(moment, !this->NextBalloon.names.empty()));
 }
 
 void InstrumentPanel::Take(Scenario& scenario) const

@@ -20,7 +20,7 @@ class InstrumentPanel : public QGroupBox
 {
 public:
   InstrumentPanel();
-  std::function<void(const RecordedEvent&)> chosen; ///< another balloon
+  std::function<void(const RecordedEvent&)> chosen; ///< another wire, another balloon
   /// @param aorta  whether there is one that a guide can come through
   void ShowScenario(const Scenario& scenario, bool aorta);
   void ShowMoment(const SessionSnapshot& moment, const WallTopology& topology);
@@ -28,15 +28,24 @@ public:
   void Take(Scenario& scenario) const;
 
 private:
-  void ShowNext();
+  /// Takes the next of the scenario's instruments of a kind, after the last one the first.
+  struct NextButton
+  {
+    QPushButton* button = PanelButton("Exchange", "");
+    std::vector<std::string> names; ///< in the order in which they are taken
+    std::size_t inUse = 0;
+
+    std::size_t Next() const { return (this->inUse + 1) % this->names.size(); }
+    void Show() const;
+    void Use(std::size_t number);
+  };
 
   QComboBox* Wire = ChoiceBox();
   QComboBox* Catheter = ChoiceBox();
   QCheckBox* FromArch = new QCheckBox("from the arch");
   QComboBox* Balloon = ChoiceBox();
-  QPushButton* Next = PanelButton("Exchange", "");
-  std::vector<std::string> Balloons; ///< names, in the order in which they are taken
-  std::size_t InUse = 0;
+  NextButton NextWire;
+  NextButton NextBalloon;
   QLabel* Text = new QLabel;
 };
 }

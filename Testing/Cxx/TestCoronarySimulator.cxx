@@ -566,6 +566,20 @@ TEST_F(TestCoronarySimulator, TellsOfLesionsAndOfTheBalloon)
       s["exchanges"] = { "none" };
     },
     "has no balloon 'none'");
+  const auto occlusion = [&](double degree, const json& cap)
+  {
+    json made = lesion("pRCA", degree);
+    made["cap_MPa"] = cap;
+    return made;
+  };
+  this->ExpectBadScenario([&](json& s) { s["lesions"] = { lesion("pRCA", 0.96) }; }, "not 1");
+  this->ExpectBadScenario(
+    [&](json& s) { s["lesions"] = { occlusion(0.9, 12) }; }, "lesion 1 has 'cap_MPa', which only");
+  this->ExpectBadScenario([&](json& s) { s["lesions"] = { occlusion(1, -12) }; }, "'cap_MPa'");
+  this->ExpectBadScenario([&](json& s) { s["lesions"] = { occlusion(1, "hard") }; }, "'cap_MPa'");
+  this->ExpectBadScenario(
+    [](json& s) { s["wire_exchanges"] = { "none" }; }, "has no wire 'none'; it has workhorse");
+  this->ExpectBadScenario([](json& s) { s["wire_exchanges"] = "cto-9gf"; }, "'wire_exchanges'");
 }
 
 TEST_F(TestCoronarySimulator, RefusesInstrumentsThatDoNotFit)
@@ -573,6 +587,7 @@ TEST_F(TestCoronarySimulator, RefusesInstrumentsThatDoNotFit)
   // A wire as thick as the catheter, and a catheter as thick as the vessel.
   ASSERT_EQ(this->Run("--scenario s.json --print-scenario"), 0);
   json scenario = json::parse(ReadText(this->Folder / "stdout"));
+  json exchange = scenario;
   for (json& section : scenario["wire"]["sections"])
   {
     section["diameter_mm"] = 1.9;
@@ -580,6 +595,11 @@ TEST_F(TestCoronarySimulator, RefusesInstrumentsThatDoNotFit)
   }
   this->Put("thick.json", scenario);
   EXPECT_EQ(this->Run("--headless --quiet --scenario thick.json --ticks 10"), 1) << this->Said();
+  scenario["wire"]["name"] = "thick";
+  exchange["wire_exchanges"] = { scenario["wire"] };
+  this->Put("thick.json", exchange);
+  EXPECT_EQ(this->Run("--headless --quiet --scenario thick.json --ticks 10"), 1);
+  EXPECT_NE(this->Said().find("the wire 'thick' is thicker"), std::string::npos) << this->Said();
   EXPECT_EQ(this->Run("--scenario s.json --print-scenario"), 0);
   scenario = json::parse(ReadText(this->Folder / "stdout"));
   scenario["catheter"]["outer_diameter_mm"] = 8.0;
@@ -622,8 +642,8 @@ TEST_F(TestCoronarySimulator, NamesTheProgramForPosing)
 TEST_F(TestCoronarySimulator, PrintsWhatItKnows)
 {
   ASSERT_EQ(this->Run("--list-scenarios"), 0);
-  for (const char* name : { "phantom-lca", "phantom-rca", "hra-lca", "angiogram-lca", "lad-lesion",
-         "lad-stent", "patient-lca", "patient-rca" })
+  for (const char* name : { "phantom-lca", "phantom-rca", "hra-lca", "angiogram-lca", "cto-lad",
+         "lad-lesion", "lad-stent", "patient-lca", "patient-rca" })
   {
     EXPECT_NE(ReadText(this->Folder / "stdout").find(name), std::string::npos);
   }

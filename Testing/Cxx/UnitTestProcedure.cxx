@@ -52,8 +52,8 @@ struct Played
   std::size_t Go()
   {
     this->Metrics.procedureSeconds += 1.0;
-    this->Watch.Step(
-      { this->Report, this->Metrics, this->Pose, this->Cine, this->Run, this->Injected },
+    this->Watch.Step({ this->Report, this->Metrics, this->Pose, this->Cine, this->Run,
+                       this->Injected, this->Wire },
       this->Lesions, this->Stents, this->Said);
     return this->Watch.State().reached.size();
   }
@@ -66,6 +66,7 @@ struct Played
   bool Cine = false;
   std::int64_t Run = 0;
   double Injected = 0.0;
+  std::size_t Wire = 0;
   std::vector<std::string> Said;
   ProcedureWatch Watch;
 };
@@ -133,6 +134,26 @@ TEST(Procedure, StepsAreDoneInTheirOrder)
   EXPECT_EQ(played.Go(), 4U) << "the balloon is in the vessel";
   report.balloon.place = -1;
   EXPECT_EQ(played.Go(), 5U);
+}
+
+TEST(Procedure, WiresAtALesion)
+{
+  Played played({ Step(Goal::WireAtLesion, 3.0), Step(Goal::WireTaken, 1.0) });
+  TickReport& report = played.Report;
+  report.catheterTip = 2.0;
+  report.inserted = 15.5;
+  report.branch = 3;
+  EXPECT_EQ(played.Go(), 0U) << "in another branch";
+  report.branch = -1;
+  EXPECT_EQ(played.Go(), 0U) << "not known yet";
+  report.branch = 0; // before it
+  report.inserted = 14.9;
+  EXPECT_EQ(played.Go(), 0U);
+  report.inserted = 15.0;
+  EXPECT_EQ(played.Go(), 1U);
+  EXPECT_EQ(played.Go(), 1U);
+  played.Wire = 1;
+  EXPECT_EQ(played.Go(), 2U);
 }
 
 TEST(Procedure, VesselsAndStents)

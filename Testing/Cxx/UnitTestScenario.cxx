@@ -70,7 +70,7 @@ public:
 TEST(UnitTestScenario, BuiltInOnesAreGood)
 {
   const auto list = coronary::BuiltInScenarios();
-  ASSERT_EQ(list.size(), 9U);
+  ASSERT_EQ(list.size(), 10U);
   for (const auto& one : list)
   {
     const Scenario scenario = LoadScenario(one.name);
@@ -98,6 +98,13 @@ TEST(UnitTestScenario, BuiltInOnesAreGood)
   EXPECT_NO_THROW(stented.balloon->Validate());
   ASSERT_EQ(stented.exchanges.size(), 1U);
   EXPECT_EQ(coronary::BalloonOf(stented, 1), &stented.exchanges[0]);
+  const Scenario occluded = LoadScenario("cto-lad");
+  ASSERT_EQ(occluded.wireExchanges.size(), 1U);
+  EXPECT_EQ(coronary::WireOf(occluded, 0), &occluded.wire);
+  EXPECT_EQ(coronary::WireOf(occluded, 1)->name, "cto-9gf");
+  EXPECT_EQ(coronary::WireOf(occluded, 2), nullptr);
+  ASSERT_EQ(occluded.lesions.size(), 1U);
+  EXPECT_EQ(occluded.lesions[0].degree, 1.0);
 }
 
 TEST(UnitTestScenario, TextSaysEverythingToTheBit)
@@ -131,7 +138,12 @@ TEST(UnitTestScenario, TextSaysEverythingToTheBit)
     EXPECT_EQ(again.vessels.contraction.twist, scenario.vessels.contraction.twist);
     EXPECT_EQ(again.balloon.has_value(), scenario.balloon.has_value());
     EXPECT_EQ(again.exchanges.size(), scenario.exchanges.size());
-    EXPECT_EQ(again.lesions.size(), scenario.lesions.size());
+    EXPECT_EQ(again.wireExchanges.size(), scenario.wireExchanges.size());
+    ASSERT_EQ(again.lesions.size(), scenario.lesions.size());
+    for (std::size_t n = 0; n < scenario.lesions.size(); ++n)
+    {
+      EXPECT_EQ(again.lesions[n].strength, scenario.lesions[n].strength);
+    }
     ASSERT_EQ(again.procedure.size(), scenario.procedure.size());
     for (std::size_t n = 0; n < scenario.procedure.size(); ++n)
     {
@@ -166,6 +178,11 @@ TEST(UnitTestScenario, StepsOfAProcedure)
       with({ { "text", "go" }, { "goal", "stenosis_below" }, { "percent", 120 } });
     },
     "'percent'");
+  ExpectRefusal(
+    [&] {
+      with({ { "text", "go" }, { "goal", "wire_taken" }, { "number", 1 } });
+    },
+    "'file' has a step 'go' that takes a wire that it has not");
   ExpectRefusal([&] { with({ { "goal", "wire_back" } }); }, "'text'");
   ExpectRefusal([&] { with({ { "text", "go" }, { "goal", "wire_back" }, { "mm", 3 } }); }, "'mm'");
 }
@@ -368,7 +385,7 @@ TEST(UnitTestScenario, ScriptsAreEvenPieces)
   const auto script =
     coronary::DriveScriptFromText(R"({ "format": "dynamiccoronary script", "version": 1,
     "pieces": [ { "seconds": 4, "wire_mm": 20 }, { "seconds": 0, "wire_deg": 90 },
-      { "seconds": 2, "wire_mm": -10, "catheter_mm": 1, "heart_rate_bpm": 90 } ] })",
+      { "seconds": 2, "wire_mm": -10, "catheter_mm": 1, "heart_rate_bpm": 90, "exchange_wire": 1 } ] })",
       "'script'");
   EXPECT_EQ(script.Duration(), 6.0);
   EXPECT_EQ(script.At(-1.0).drive.wirePosition, 0.0);
@@ -381,6 +398,8 @@ TEST(UnitTestScenario, ScriptsAreEvenPieces)
   EXPECT_TRUE(script.HeartRates(0.0, 4.0).empty());
   EXPECT_EQ(script.HeartRates(4.0, 4.0005), std::vector<double>{ 90.0 });
   EXPECT_TRUE(script.HeartRates(4.0005, 9.0).empty());
+  EXPECT_EQ(script.WireExchanges(0.0, 9.0), std::vector<double>{ 1.0 });
+  EXPECT_TRUE(script.Exchanges(0.0, 9.0).empty());
   EXPECT_EQ(coronary::DriveScript().At(1.0).drive.wirePosition, 0.0);
   const auto refused = [](const std::string& pieces, const std::string& part)
   {
@@ -396,6 +415,7 @@ TEST(UnitTestScenario, ScriptsAreEvenPieces)
   refused(R"([ { "seconds": -1 } ])", "'s.json', piece 1 has a negative 'seconds'");
   refused(R"([ { "seconds": 1 }, { "seconds": 1, "wire": 3 } ])", "piece 2 has 'wire'");
   refused(R"([ { "seconds": 1, "heart_rate_bpm": 900 } ])", "'heart_rate_bpm'");
+  refused(R"([ { "seconds": 1, "exchange_wire": -1 } ])", "'exchange_wire'");
   refused(R"([ { "wire_mm": 1 } ])", "has no 'seconds'");
   refused("3", "is no list");
 }
