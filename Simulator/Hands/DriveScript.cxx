@@ -15,6 +15,7 @@ namespace
 constexpr std::size_t MostPieces = 100000;
 constexpr double LongestPiece = 36000.0; // s
 constexpr double MaximumHeartRate = 240.0;
+constexpr double MaximumBreaths = 60.0; // a minute
 constexpr std::int64_t MostBalloons = 100;
 constexpr double FurthestOfOld = 1e6; // mm, degrees, mL
 
@@ -66,6 +67,8 @@ DrivePiece PieceOf(JsonFields& member, PiecesOf form)
   piece.heartRate = member.Number("heart_rate_bpm", 0.0, MaximumHeartRate, 0.0);
   piece.exchanges = member.Has("exchange");
   piece.exchange = static_cast<double>(member.Whole("exchange", 0, MostBalloons, 0));
+  piece.setsBreaths = member.Has("breaths_per_min");
+  piece.breaths = member.Number("breaths_per_min", 0.0, MaximumBreaths, 0.0);
   member.Done();
   return piece;
 }
@@ -156,6 +159,11 @@ std::vector<double> DriveScript::HeartRates(double from, double to) const
 std::vector<double> DriveScript::Exchanges(double from, double to) const
 {
   return this->Chosen(from, to, &DrivePiece::exchanges, &DrivePiece::exchange);
+}
+
+std::vector<double> DriveScript::BreathRates(double from, double to) const
+{
+  return this->Chosen(from, to, &DrivePiece::setsBreaths, &DrivePiece::breaths);
 }
 
 DriveScript DriveScriptOf(JsonFields& fields, PiecesOf form)

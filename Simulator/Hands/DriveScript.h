@@ -26,6 +26,8 @@ struct DrivePiece
   double heartRate = 0.0;     ///< beats a minute
   bool exchanges = false;     ///< when the piece begins
   double exchange = 0.0;      ///< number of the balloon that is taken
+  bool setsBreaths = false;   ///< when the piece begins
+  double breaths = 0.0;       ///< a minute; 0: the breath is held
 };
 
 class DriveScript
@@ -46,6 +48,8 @@ public:
   std::vector<double> HeartRates(double from, double to) const;
   /// Likewise numbers of the balloons that are taken.
   std::vector<double> Exchanges(double from, double to) const;
+  /// Likewise breaths a minute.
+  std::vector<double> BreathRates(double from, double to) const;
 
 private:
   std::vector<double> Chosen(
