@@ -105,8 +105,7 @@ std::vector<NumberEntry> NumbersOf(ContrastSettings& s)
 
 std::vector<NumberEntry> NumbersOf(BreathingSettings& s)
 {
-  return { { "rate_per_min", &s.rate, 0.0, Breathing::FastestRate },
-    { "amplitude_mm", &s.amplitude, 0.0, 40.0 } };
+  return { { "rate_per_min", &s.rate, 0.0, 60.0 }, { "amplitude_mm", &s.amplitude, 0.0, 40.0 } };
 }
 
 void ReadNumbers(JsonFields& fields, const std::vector<NumberEntry>& entries)
