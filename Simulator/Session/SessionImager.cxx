@@ -310,7 +310,7 @@ const GreyImage& SessionImager::Expose(const SessionSnapshot& snapshot)
     this->BackgroundLayer, this->InstrumentLayer, this->ContrastLayer, snapshot.exposure);
 }
 
-/// The shadows of its parts are begun when the whole is finished.
+/// The shadows of its parts are begun one after the other when the whole is finished.
 void SessionImager::MoveBackground(const SessionSnapshot& snapshot, const CArmGeometry& geometry)
 {
   const auto whole = this->Background->Current(&this->Completeness);
@@ -320,16 +320,16 @@ void SessionImager::MoveBackground(const SessionSnapshot& snapshot, const CArmGe
     return;
   }
   this->BackgroundLayer = *whole;
+  double finished = this->Completeness;
   const auto move = [&](std::optional<Part>& part, const AffineMotion& motion)
   {
-    if (!part || this->Completeness < 1.0 || motion.IsRest())
+    if (!part || finished < 1.0 || motion.IsRest())
     {
       return;
     }
     part->shadow->SetGeometry(geometry);
-    double completeness = 0.0;
-    const auto shadow = part->shadow->Current(&completeness);
-    if (shadow && completeness == 1.0)
+    const auto shadow = part->shadow->Current(&finished);
+    if (shadow && finished == 1.0)
     {
       AddMotion(*shadow, geometry, part->middle, motion, this->BackgroundLayer);
     }

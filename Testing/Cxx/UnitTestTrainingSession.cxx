@@ -322,12 +322,14 @@ TEST(SessionImager, BreathingMovesTheHeartWithAllThatIsInIt)
   const CArmGeometry geometry(moment.pose, format);
   const Vector3 tip = moment.wire[6];
   EXPECT_GT(At(imager.Instruments(), geometry.Project(tip + HeartShift(moment.diaphragm))), 0.1F);
-  EXPECT_LT(At(imager.Instruments(), geometry.Project(tip)), 0.02F);
 
   // At the end of expiration, and with a heart whose shadow stands still, not a bit is changed.
   moment.diaphragm = 0.0;
-  ++moment.exposure.sequence;
-  EXPECT_EQ(hash(imager), hash(still));
+  scenario.imaging.heartShadowMoves = false;
+  SessionImager expired(Phantom()->Topology(), scenario, Water(scenario), false, parts);
+  SessionImager before(Phantom()->Topology(), scenario, Water(scenario), false);
+  EXPECT_EQ(hash(expired), hash(before));
+  EXPECT_GT(At(expired.Instruments(), geometry.Project(tip)), 0.1F);
   EXPECT_TRUE(session.Apply({ RecordedEvent::Breaths, 0.0 }));
   session.Step(input);
   session.SnapshotOfImage(moment);
@@ -338,7 +340,6 @@ TEST(SessionImager, BreathingMovesTheHeartWithAllThatIsInIt)
   }
   session.SnapshotOfImage(moment);
   EXPECT_EQ(moment.diaphragm, held);
-  scenario.imaging.heartShadowMoves = false;
   scenario.imaging.breathing.amplitude = 0.0;
   EXPECT_FALSE(MovingPartsOf(WaterVolume(scenario), Phantom()->Topology(), scenario.imaging));
 }
