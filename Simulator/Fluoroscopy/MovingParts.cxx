@@ -363,7 +363,7 @@ AffineMotion MotionOf(const std::vector<Vector3>& rest, const std::vector<Vector
   }
   spread.diagonal().array() += Ridge * spread.trace() / 3.0 + 1e-9;
   const Matrix3 linear = Matrix3::Identity() + moved * spread.inverse();
-  motion.linear = linear.determinant() > SolidEnough ? linear : Matrix3::Identity();
+  motion.linear = linear.determinant() > SolidEnough ? linear : Matrix3(Matrix3::Identity());
   motion.shift = to - motion.linear * from;
   return motion;
 }
