@@ -247,7 +247,7 @@ std::shared_ptr<const VolumeProjector> Weighted(const Upright& body,
 }
 }
 
-HeartPlace HeartAbout(const std::vector<Vector3>& arteries)
+HeartPlace HeartAbout(const std::vector<Vector3>& arteries, const Vector3& base)
 {
   RequireParts(arteries.size() >= 4, "a heart has to have four points of its arteries");
   Vector3 mean = Vector3::Zero();
@@ -272,6 +272,11 @@ HeartPlace HeartAbout(const std::vector<Vector3>& arteries)
   }
   heart.centre = heart.axes.transpose() * (0.5 * (low + high));
   heart.radii = (0.5 * (high - low)).array() + WallOfHeart;
+  const Vector3 apex = *std::max_element(arteries.begin(), arteries.end(),
+    [&](const Vector3& a, const Vector3& b)
+    { return (a - base).squaredNorm() < (b - base).squaredNorm(); });
+  RequireParts(apex != base, "a heart has to have arteries away from its base");
+  heart.toApex = (apex - base).normalized();
   // One artery alone is flat; a heart is not.
   heart.radii = heart.radii.cwiseMax(0.6 * heart.radii.maxCoeff());
   return heart;
@@ -290,6 +295,7 @@ MovingParts FindMovingParts(const HounsfieldVolume& patient, const HeartPlace& h
     excess[n] = static_cast<float>(std::clamp(own, lung, tissue) - lung);
   }
   MovingParts parts;
+  parts.place = heart;
   parts.heart.middle = heart.centre;
   std::array<int, 6> box{};
   const double reach = HeartEnds * heart.radii.maxCoeff();
@@ -366,6 +372,14 @@ AffineMotion MotionOf(const std::vector<Vector3>& rest, const std::vector<Vector
   motion.linear = linear.determinant() > SolidEnough ? linear : Matrix3(Matrix3::Identity());
   motion.shift = to - motion.linear * from;
   return motion;
+}
+
+AffineMotion AcrossHeart(const AffineMotion& arteries, const HeartPlace& heart)
+{
+  const Matrix3 across = Matrix3::Identity() - heart.toApex * heart.toApex.transpose();
+  const Matrix3 change = across * (arteries.linear - Matrix3::Identity()) * across;
+  const Vector3 moved = arteries.linear * heart.centre + arteries.shift - heart.centre;
+  return { Matrix3::Identity() + change, across * moved - change * heart.centre };
 }
 
 void AddMotion(const LineIntegrals& part, const CArmGeometry& geometry, const Vector3& middle,

@@ -26,11 +26,16 @@ struct HeartPlace
 {
   Vector3 centre{ Vector3::Zero() };        ///< mm
   Matrix3 axes{ Matrix3::Identity() };      ///< rows
+  Vector3 toApex{ Vector3::UnitZ() };       ///< unit, from the base
   Vector3 radii{ Vector3::Constant(50.0) }; ///< mm
 };
 
-/// Along the principal axes of points on its surface. @throws std::invalid_argument for fewer than four points
-HeartPlace HeartAbout(const std::vector<Vector3>& arteries);
+/**
+ * Along the principal axes of points on its surface.
+ * @param base  in the middle of the ostia; the apex is the point that is furthest from it
+ * @throws std::invalid_argument for fewer than four points, or all at the base
+ */
+HeartPlace HeartAbout(const std::vector<Vector3>& arteries, const Vector3& base);
 
 struct MovingPart
 {
@@ -40,6 +45,7 @@ struct MovingPart
 
 struct MovingParts
 {
+  HeartPlace place;
   MovingPart heart;
   MovingPart diaphragm; ///< and what is below it
 };
@@ -65,6 +71,12 @@ struct AffineMotion
 /// That takes points nearest to where they are now (least squares; what they do not tell stays at rest).
 /// @throws std::invalid_argument for lists of different length
 AffineMotion MotionOf(const std::vector<Vector3>& rest, const std::vector<Vector3>& now);
+
+/**
+ * What the whole heart's shadow does of its arteries' motion: what is across its long axis. Along it the base of the
+ * ventricles comes down while the atria behind it fill: the outline stays.
+ */
+AffineMotion AcrossHeart(const AffineMotion& arteries, const HeartPlace& heart);
 
 /**
  * Adds the shadow of a part that has moved, and takes away that of its rest. The motion is that of the plane through

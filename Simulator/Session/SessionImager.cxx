@@ -25,7 +25,7 @@ constexpr double InnerTube =
 constexpr double MarkerThickness = 0.04; // mm of platinum
 constexpr double BlushSigma = 7.0;       // mm of the myocardium behind an outlet
 constexpr double FaintestBlush = 1e-5;   // mL
-constexpr double CoarseThorax = 6.0;     // mm between the voxels that the exposure control sees
+constexpr double CoarseThorax = 4.0;     // mm between the voxels that the exposure control sees
 constexpr std::size_t MemoryOfPart = 32U << 20U; // bytes of shadows that are kept
 
 /// Where a branch leaves its parent: number of the nearest point of the parent's axis.
@@ -236,9 +236,19 @@ std::shared_ptr<const MovingParts> MovingPartsOf(const HounsfieldVolume& backgro
   {
     return nullptr;
   }
+  Vector3 base = Vector3::Zero();
+  double roots = 0.0;
+  for (std::size_t b = 0; b < topology.axis.size(); ++b)
+  {
+    if (topology.parent[b] < 0)
+    {
+      base += topology.axis[b].front();
+      roots += 1.0;
+    }
+  }
   const Attenuation materials(imaging.energy);
   return std::make_shared<MovingParts>(FindMovingParts(
-    background, HeartAbout(PointsOfAxis(topology)),
+    background, HeartAbout(PointsOfAxis(topology), base / roots),
     [&materials](double hounsfield) { return materials.OfHounsfield(hounsfield); }, progress));
 }
 
@@ -272,6 +282,7 @@ SessionImager::SessionImager(const WallTopology& topology, const Scenario& scena
   };
   if (moving)
   {
+    this->Place = moving->place;
     take(moving->heart, this->Heart);
     take(moving->diaphragm, this->Diaphragm);
   }
@@ -337,7 +348,7 @@ void SessionImager::MoveBackground(const SessionSnapshot& snapshot, const CArmGe
   AffineMotion beat;
   if (this->Scenario_.imaging.heartShadowMoves)
   {
-    beat = MotionOf(this->AxisAtRest, snapshot.axis);
+    beat = AcrossHeart(MotionOf(this->AxisAtRest, snapshot.axis), this->Place);
   }
   beat.shift += HeartShift(snapshot.diaphragm);
   move(this->Heart, beat);

@@ -122,6 +122,7 @@ private:
   double NeatContrast;             ///< 1/mm
   std::vector<Vector3> AxisAtRest; ///< as SessionSnapshot::axis
   std::unique_ptr<BackgroundCache> Background;
+  HeartPlace Place;
   std::optional<Part> Heart;     ///< none: it stands still
   std::optional<Part> Diaphragm; ///< likewise
   FluoroscopyImager Images_;

@@ -149,7 +149,7 @@ TEST(ExposureControl, theClockDosesAsTheViewNeedsUpToTheLimit)
 
 TEST(ExposureControl, theMeanOfTheUsualViewsHasTheReferenceLevelsDose)
 {
-  const ExposureControl coarse = Thorax(6.0);
+  const ExposureControl coarse = Thorax(4.0);
   const ExposureControl fine = Thorax(1.5);
   double sum = 0.0;
   for (const auto& [lao, cranial] : UsualViews)
@@ -168,7 +168,7 @@ TEST(ExposureControl, theMeanOfTheUsualViewsHasTheReferenceLevelsDose)
   EXPECT_NEAR(sum, 1.0, 0.02);
   // Steep views go through more of the patient.
   const double frontal = OfHeart(coarse, 0.0, 0.0).kerma;
-  EXPECT_GT(OfHeart(coarse, 0.0, 35.0).kerma, 1.3 * frontal);
-  EXPECT_GT(OfHeart(coarse, 45.0, -25.0).kerma, 1.5 * frontal);
+  EXPECT_GT(OfHeart(coarse, 0.0, -30.0).kerma, 1.5 * frontal);
+  EXPECT_GT(OfHeart(coarse, 45.0, -25.0).kerma, 2.5 * frontal);
 }
 }

@@ -206,7 +206,7 @@ TEST(MovingParts, theHeartIsAboutItsArteries)
       std::sqrt(1.0 - z * z) * std::cos(angle), std::sqrt(1.0 - z * z) * std::sin(angle), z);
     points.push_back(centre + axes.transpose() * radii.cwiseProduct(unit));
   }
-  const HeartPlace heart = HeartAbout(points);
+  const HeartPlace heart = HeartAbout(points, centre - 60.0 * axes.row(2).transpose());
   EXPECT_LT((heart.centre - centre).norm(), 1.0);
   Vector3 sorted = heart.radii;
   std::sort(sorted.data(), sorted.data() + 3);
@@ -224,6 +224,17 @@ TEST(MovingParts, theHeartIsAboutItsArteries)
     EXPECT_LT((found.linear * point + found.shift - beat.linear * point - beat.shift).norm(), 0.2);
   }
   EXPECT_TRUE(MotionOf(points, points).IsRest());
+  EXPECT_GT(heart.toApex.dot(axes.row(2)), 0.99);
+  // Its outline gets narrower, and no shorter.
+  const Matrix3 along = heart.toApex * heart.toApex.transpose();
+  const AffineMotion squeezed{ 0.9 * Matrix3::Identity() - 0.1 * along, 0.1 * heart.centre };
+  const AffineMotion outline = AcrossHeart(squeezed, heart);
+  const Vector3 side = heart.toApex.unitOrthogonal();
+  const auto moves = [&](const Vector3& way) -> Vector3
+  { return outline.linear * (heart.centre + way) + outline.shift - heart.centre - way; };
+  EXPECT_NEAR((moves(30.0 * heart.toApex) - moves(Vector3::Zero())).norm(), 0.0, 1e-9);
+  EXPECT_NEAR((moves(30.0 * side) - moves(Vector3::Zero()) + 3.0 * side).norm(), 0.0, 1e-9);
+  EXPECT_NEAR(heart.toApex.dot(moves(Vector3::Zero())), 0.0, 1e-9);
   // A flat list says nothing across itself.
   std::vector<Vector3> flat;
   std::vector<Vector3> wider;
@@ -236,7 +247,9 @@ TEST(MovingParts, theHeartIsAboutItsArteries)
   EXPECT_NEAR(across.linear(0, 0), 1.1, 0.005);
   EXPECT_EQ(across.linear(2, 2), 1.0);
 
-  ExpectRefusal([] { HeartAbout({ Vector3::Zero() }); }, "four points");
+  ExpectRefusal([] { HeartAbout({ Vector3::Zero() }, Vector3::Zero()); }, "four points");
+  ExpectRefusal([] { HeartAbout(std::vector<Vector3>(5, Vector3::Zero()), Vector3::Zero()); },
+    "away from its base");
   ExpectRefusal([&] { MotionOf(points, flat = {}); }, "as many");
   LineIntegrals other(10, 10);
   ExpectRefusal([&] { AddMotion(other, Geometry(0, 0), {}, beat, other); }, "format");
