@@ -22,10 +22,9 @@ namespace coronary
 class ExposureControl
 {
 public:
-  static constexpr double MeasuredShare = 0.5; ///< of the field's width and height
-  static constexpr double ReferenceThickness =
-    200.0;                                   ///< mm of water that need factor 1; calibrated
-  static constexpr double LeastFactor = 0.1; ///< chosen, as the next: a generator's range
+  static constexpr double MeasuredShare = 0.5;        ///< of the field's width and height
+  static constexpr double ReferenceThickness = 233.3; ///< mm of water: factor 1; calibrated
+  static constexpr double LeastFactor = 0.1;          ///< chosen, as the next: a generator's range
   static constexpr double GreatestFactor = 10.0;
 
   /**
