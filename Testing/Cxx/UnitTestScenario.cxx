@@ -293,7 +293,7 @@ TEST(UnitTestScenario, RefusesWrongImagingAndContrast)
   Refused([](json& s) { s["imaging"]["exposure_control"] = 1; }, "'exposure_control'");
   Refused([](json& s) { s["imaging"]["heart_shadow_moves"] = "yes"; }, "'heart_shadow_moves'");
   Refused([](json& s) { s["imaging"]["breathing"]["rate_per_min"] = -1; },
-    "imaging, breathing has 'rate_per_min'");
+    "imaging, breathing has a negative 'rate_per_min'");
   Refused([](json& s) { s["imaging"]["breathing"]["amplitude_mm"] = 41; }, "'amplitude_mm'");
   Refused([](json& s) { s["imaging"]["breathing"]["depth"] = 3; }, "'depth', which means nothing");
   Refused([](json& s) { s["imaging"]["breathing"] = 15; }, "'breathing'");
