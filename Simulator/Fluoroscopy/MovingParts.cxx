@@ -113,6 +113,11 @@ Upright UprightOf(const HounsfieldVolume& volume, const ProgressCallback& progre
   {
     upright.size[a] = static_cast<int>(std::floor((high[a] - low[a]) / upright.spacing + 1e-6)) + 1;
   }
+  if (grid.direction == Matrix3::Identity() && grid.spacing == Vector3::Constant(upright.spacing))
+  {
+    upright.values = volume.values; // as the phantom's
+    return upright;
+  }
   upright.values.resize(upright.Index(0, 0, upright.size[2]));
   const Matrix3 toIndex = grid.spacing.cwiseInverse().asDiagonal() * grid.direction.transpose();
   ParallelFor(

@@ -192,6 +192,40 @@ TEST(MovingParts, theDiaphragmGoesDown)
   EXPECT_FALSE(FindMovingParts(Ball(Vector3::Zero(), 30.0), heart, Attenuates).diaphragm.projector);
 }
 
+TEST(MovingParts, voxelsMayLieInAnyDirection)
+{
+  const HounsfieldVolume volume = Floor(-20.0);
+  HounsfieldVolume turned = volume;
+  const std::array<int, 3> n = volume.View().Dimensions();
+  turned.grid.direction = Vector3(1.0, -1.0, -1.0).asDiagonal();
+  turned.grid.origin = volume.grid.IndexToWorld(0, n[1] - 1, n[2] - 1);
+  for (int k = 0; k < n[2]; ++k)
+  {
+    for (int j = 0; j < n[1]; ++j)
+    {
+      std::copy_n(volume.values.begin() + static_cast<std::ptrdiff_t>(k * n[1] + j) * n[0], n[0],
+        turned.values.begin() +
+          static_cast<std::ptrdiff_t>((n[2] - 1 - k) * n[1] + n[1] - 1 - j) * n[0]);
+    }
+  }
+  const CArmGeometry geometry = Geometry(30.0, 20.0);
+  const MovingParts parts = FindMovingParts(volume, Place(40.0), Attenuates);
+  const MovingParts same = FindMovingParts(turned, Place(40.0), Attenuates);
+  for (const auto part : { &MovingParts::heart, &MovingParts::diaphragm })
+  {
+    ASSERT_TRUE((parts.*part).projector && (same.*part).projector);
+    const LineIntegrals one = (parts.*part).projector->Project(geometry);
+    const LineIntegrals other = (same.*part).projector->Project(geometry);
+    double most = 0.0;
+    for (std::size_t p = 0; p < one.values.size(); ++p)
+    {
+      most = std::max(most, static_cast<double>(one.values[p]));
+      ASSERT_NEAR(one.values[p], other.values[p], 1e-4) << p;
+    }
+    EXPECT_GT(most, 0.5);
+  }
+}
+
 TEST(MovingParts, theHeartIsAboutItsArteries)
 {
   Matrix3 axes = (Eigen::AngleAxisd(0.6, Vector3(1, 2, 3).normalized())).toRotationMatrix();
