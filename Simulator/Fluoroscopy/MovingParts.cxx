@@ -393,7 +393,8 @@ void AddMotion(const LineIntegrals& part, const CArmGeometry& geometry, const Ve
   const DetectorFormat& format = geometry.Format();
   const auto fits = [&](const LineIntegrals& one)
   { return one.columns == format.columns && one.rows == format.rows; };
-  RequireParts(fits(part) && fits(image), "images have to be of the detector's format");
+  RequireParts(fits(part) && fits(image) && format.columns > 1 && format.rows > 1,
+    "images have to be of the detector's format, two pixels each way or more");
   if (motion.IsRest())
   {
     return;
@@ -416,30 +417,33 @@ void AddMotion(const LineIntegrals& part, const CArmGeometry& geometry, const Ve
   const double perRow[2] = { slope(u, v) / aspect, slope(v, v) };
   // Where it is squeezed along the beam there is less of it.
   const auto depth = static_cast<float>(1.0 / along.dot(back * along));
-  const auto lastColumn = static_cast<float>(format.columns - 1);
-  const auto lastRow = static_cast<float>(format.rows - 1);
+  // Just inside of the image, so that there is a pixel to the right and below.
+  const float lastColumn = std::nextafter(static_cast<float>(format.columns - 1), 0.0F);
+  const float lastRow = std::nextafter(static_cast<float>(format.rows - 1), 0.0F);
+  const auto stepX = static_cast<float>(perColumn[0]);
+  const auto stepY = static_cast<float>(perColumn[1]);
   for (int row = 0; row < format.rows; ++row)
   {
-    const double startX = from.x() - to.x() * perColumn[0] + (row - to.y()) * perRow[0];
-    const double startY = from.y() - to.x() * perColumn[1] + (row - to.y()) * perRow[1];
-    const auto offset = static_cast<std::size_t>(row) * format.columns;
-    const float* rest = &part.values[offset];
-    float* out = &image.values[offset];
+    const auto startX =
+      static_cast<float>(from.x() - to.x() * perColumn[0] + (row - to.y()) * perRow[0]);
+    const auto startY =
+      static_cast<float>(from.y() - to.x() * perColumn[1] + (row - to.y()) * perRow[1]);
+    const float* rest = &part.values[static_cast<std::size_t>(row) * format.columns];
+    float* out = &image.values[static_cast<std::size_t>(row) * format.columns];
     for (int column = 0; column < format.columns; ++column)
     {
-      const float x =
-        std::clamp(static_cast<float>(startX + column * perColumn[0]), 0.0F, lastColumn);
-      const float y = std::clamp(static_cast<float>(startY + column * perColumn[1]), 0.0F, lastRow);
-      const int i = std::min(static_cast<int>(x), std::max(0, format.columns - 2));
-      const int j = std::min(static_cast<int>(y), std::max(0, format.rows - 2));
+      const auto at = static_cast<float>(column);
+      const float x = std::min(std::max(startX + at * stepX, 0.0F), lastColumn);
+      const float y = std::min(std::max(startY + at * stepY, 0.0F), lastRow);
+      const int i = static_cast<int>(x);
+      const int j = static_cast<int>(y);
       const float fx = x - static_cast<float>(i);
       const float fy = y - static_cast<float>(j);
-      const int right = format.columns > 1 ? 1 : 0;
-      const float* a = &part.values[static_cast<std::size_t>(j) * format.columns + i];
-      const float* b = a + (format.rows > 1 ? format.columns : 0);
-      const float upper = a[0] + fx * (a[right] - a[0]);
-      const float lower = b[0] + fx * (b[right] - b[0]);
-      out[column] += depth * (upper + fy * (lower - upper)) - rest[column];
+      const float* upper = &part.values[static_cast<std::size_t>(j) * format.columns + i];
+      const float* lower = upper + format.columns;
+      const float above = upper[0] + fx * (upper[1] - upper[0]);
+      const float below = lower[0] + fx * (lower[1] - lower[0]);
+      out[column] += depth * (above + fy * (below - above)) - rest[column];
     }
   }
 }
