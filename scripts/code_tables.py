@@ -33,7 +33,10 @@ GROUPS = [
           [("Simulator/Contrast/ContrastModel.h", "ContrastSettings"),
            ("Simulator/Contrast/CoronaryFlow.h", "CoronaryFlowSettings"),
            ("Simulator/Contrast/ContrastTracers.h", "ContrastTracerSettings")]),
-    Group("Scenario: imaging", "Numbers of the member `imaging` of a scenario; angles, places and rates are in "
+    Group("Scenario: breathing", "Member `imaging.breathing` of a scenario.", SCENARIO,
+          ["NumbersOf(BreathingSettings& s)"], [("Simulator/Fluoroscopy/Breathing.h", "BreathingSettings")]),
+    Group("Scenario: imaging", "Numbers of the member `imaging` of a scenario; also `exposure_control` and "
+          "`heart_shadow_moves` (true, false); angles, places and rates are in "
           "[its text](../simulator-files.md#imaging-and-contrast-medium).", SCENARIO, ["ImagingSettings ImagingOf("],
           [("Simulator/Session/Scenario.h", "ImagingSettings"), ("Simulator/Fluoroscopy/CArm.h", "CArmPose")]),
 ]

@@ -30,7 +30,7 @@ for argument in "$@"; do
 done
 build="${build:-$(dirname "${BASH_SOURCE[0]}")/../build/paraview}"
 tests=(UnitTestCosseratRod UnitTestGuideInAorta UnitTestBalloon UnitTestStent UnitTestOcclusion UnitTestWireInGuide UnitTestCoronaryFlow UnitTestIschaemia UnitTestContrastTracers UnitTestContrastModel UnitTestCArm
-  UnitTestAttenuation UnitTestXRayProjectors UnitTestDetector UnitTestAcquisition UnitTestThoraxPhantom)
+  UnitTestAttenuation UnitTestXRayProjectors UnitTestDetector UnitTestAcquisition UnitTestExposureControl UnitTestMovingParts UnitTestThoraxPhantom)
 soak="$build/bin/soak-intervention"
 if [ ! -x "$soak" ]; then
   echo "validate-simulator: $soak is not there; build first (README.md)" >&2

@@ -419,7 +419,7 @@ Scenario ScenarioOf(const HeadlessOptions& options)
   {
     const RecordingReader reader(options.replay);
     scenario =
-      ScenarioFromText(reader.Header().scenario, "The scenario in '" + options.replay + "'", ".");
+      RecordedScenario(reader.Header().scenario, "The scenario in '" + options.replay + "'");
   }
   else
   {
@@ -482,7 +482,7 @@ public:
     , Replay(replay)
     , Expected(expected)
     , Rate(world.scenario.settings.tickRate)
-    , Runner(world.wall, world.scenario, world.wallHash, std::move(source))
+    , Runner(world.wall, world.scenario, world.wallHash, std::move(source), world.measured)
     , Pictures({ options.xray, options.scene }, world)
     , Files(options, world.wall->Topology())
     , Statistics(world.wall->Topology())
@@ -741,7 +741,9 @@ void RunHeadless(const HeadlessOptions& options)
     throw UsageError(
       "--ticks is required where neither --script nor --replay says how long it takes");
   }
-  const int preparations = 1 + (options.xray ? 1 : 0) + (options.patient.empty() ? 0 : 1);
+  const bool readsPatient =
+    options.xray || (scenario.imaging.exposureControl && !scenario.imaging.background.empty());
+  const int preparations = 1 + (readsPatient ? 1 : 0) + (options.patient.empty() ? 0 : 1);
   auto progress = std::make_unique<ProgressDisplay>("step", preparations + 1, options.quiet);
   const SessionWorld world = WorldOf(options, scenario, options.xray, ShownBy(*progress));
   if (replay)
@@ -781,6 +783,8 @@ Json NameOfEvent(std::uint8_t kind)
       return "balloon_number";
     case RecordedEvent::ExchangeWire:
       return "wire_number";
+    case RecordedEvent::Breaths:
+      return "breaths_per_min";
     default:
       return static_cast<int>(kind);
   }

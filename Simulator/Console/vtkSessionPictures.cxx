@@ -63,8 +63,8 @@ SessionPictures::SessionPictures(const PictureOptions& options, const SessionWor
   const Scenario& scenario = world.scenario;
   if (options.xray)
   {
-    this->Data->Imager =
-      std::make_unique<SessionImager>(world.wall->Topology(), scenario, world.background, false);
+    this->Data->Imager = std::make_unique<SessionImager>(
+      world.wall->Topology(), scenario, world.background, false, world.moving);
     this->Data->Runs.emplace(scenario, "coronary-simulator " DYNAMICCORONARY_VERSION, 2 * CineFile);
   }
   if (options.scene)

@@ -94,6 +94,21 @@ void ExposureClock::SetFieldArea(double area)
   this->Settings_.fieldArea = area;
 }
 
+void ExposureClock::SetView(const ViewExposure& view)
+{
+  const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
+  RequireAcquisition(positive(view.photons), "factor of the photons", view.photons, "above 0");
+  RequireAcquisition(positive(view.kerma), "factor of the air kerma", view.kerma, "above 0");
+  RequireAcquisition(
+    view.fluoroscopyLimit > 0.0, "limit of fluoroscopy", view.fluoroscopyLimit, "above 0 mGy/min");
+  this->View = view;
+}
+
+bool ExposureClock::IsDue() const
+{
+  return this->Charge >= 2 * static_cast<std::int64_t>(this->Settings_.tickRate);
+}
+
 bool ExposureClock::Step(bool fluoroscopy, bool cine, bool mask)
 {
   this->MaskWanted = this->MaskWanted || (mask && !this->MaskWasDown);
@@ -107,7 +122,7 @@ bool ExposureClock::Step(bool fluoroscopy, bool cine, bool mask)
   if (this->Beam != Off)
   {
     ++this->PedalTicks[cine ? 1 : 0];
-    if (this->Charge >= needed)
+    if (this->IsDue())
     {
       this->Charge -= needed;
       this->Expose(cine);
@@ -142,7 +157,11 @@ void ExposureClock::Switch(BeamState wanted)
 
 void ExposureClock::Expose(bool cine)
 {
-  const double kerma = cine ? this->Settings_.cineKerma : this->Settings_.fluoroscopyKerma;
+  const double usual = cine ? this->Settings_.cineKerma : this->Settings_.fluoroscopyKerma;
+  const double rate =
+    FramesPerSecond(cine ? this->Settings_.cineRate : this->Settings_.fluoroscopyRate);
+  const double wanted = usual * this->View.kerma;
+  const double kerma = cine ? wanted : std::min(wanted, this->View.fluoroscopyLimit / 60.0 / rate);
   this->Last_.tick = this->Ticks;
   this->Last_.frame = this->Frames++;
   this->Last_.sequence = this->Sequence;
@@ -151,10 +170,9 @@ void ExposureClock::Expose(bool cine)
   this->Last_.run = cine ? this->Runs_ : 0;
   this->Last_.mask = this->MaskWanted;
   this->Last_.kerma = kerma;
-  this->Last_.photons =
-    kerma / this->Settings_.fluoroscopyKerma * this->Settings_.fluoroscopyPhotons;
-  this->Last_.frameRate =
-    FramesPerSecond(cine ? this->Settings_.cineRate : this->Settings_.fluoroscopyRate);
+  this->Last_.photons = this->View.photons * (kerma / wanted) *
+    (usual / this->Settings_.fluoroscopyKerma * this->Settings_.fluoroscopyPhotons);
+  this->Last_.frameRate = rate;
   this->MaskWanted = false;
 
   DoseCounters& counters = this->Counters[cine ? 1 : 0];
@@ -194,10 +212,9 @@ std::uint64_t ExposureClock::StateHash() const
   {
     hash = Hashed(value, hash);
   }
-  // 1 is where recordings had a factor of the dose, which nothing changed.
-  for (const double value :
-    { 1.0, this->Settings_.fieldArea, this->Counters[0].airKerma, this->Counters[0].doseAreaProduct,
-      this->Counters[1].airKerma, this->Counters[1].doseAreaProduct })
+  for (const double value : { this->View.kerma, this->Settings_.fieldArea,
+         this->Counters[0].airKerma, this->Counters[0].doseAreaProduct, this->Counters[1].airKerma,
+         this->Counters[1].doseAreaProduct })
   {
     hash = Hashed(value, hash);
   }

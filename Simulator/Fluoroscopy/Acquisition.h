@@ -13,6 +13,7 @@
 #include "Detector.h"
 
 #include <cstdint>
+#include <limits>
 
 namespace coronary
 {
@@ -59,6 +60,15 @@ struct Exposure
   double frameRate = 15.0; ///< Hz
 };
 
+/// What a view needs, against the settings' exposure.
+struct ViewExposure
+{
+  double photons = 1.0; ///< a pixel of the unattenuated beam, times the settings'
+  double kerma = 1.0;   ///< at the reference point, times the settings'
+  double fluoroscopyLimit =
+    std::numeric_limits<double>::infinity(); ///< mGy/min at the reference point
+};
+
 /// Of one kind of exposure.
 struct DoseCounters
 {
@@ -92,6 +102,10 @@ public:
   void SetFluoroscopyRate(FrameRate rate);
   /// cm^2 at the reference point. @throws std::invalid_argument
   void SetFieldArea(double area);
+  /// Of the next frames; before it: the settings'. @throws std::invalid_argument for what is not above 0
+  void SetView(const ViewExposure& view);
+  /// Whether the next step exposes when a pedal is down.
+  bool IsDue() const;
 
   const AcquisitionSettings& Settings() const { return this->Settings_; }
   DoseCounters Fluoroscopy() const { return this->Counted(0); }
@@ -124,6 +138,7 @@ private:
   std::int64_t FrameOfSequence = 0;
   std::int64_t Runs_ = 0;
   std::int64_t PedalTicks[2] = { 0, 0 };
+  ViewExposure View;
   DoseCounters Counters[2]; ///< fluoroscopy, cine; their seconds are not kept
   Exposure Last_;
 };

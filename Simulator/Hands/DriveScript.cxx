@@ -15,6 +15,7 @@ namespace
 constexpr std::size_t MostPieces = 100000;
 constexpr double LongestPiece = 36000.0; // s
 constexpr double MaximumHeartRate = 240.0;
+constexpr double MaximumBreaths = 60.0; // a minute
 constexpr std::int64_t MostExchanges = 100;
 constexpr double FurthestOfOld = 1e6; // mm, degrees, mL
 
@@ -68,6 +69,8 @@ DrivePiece PieceOf(JsonFields& member, PiecesOf form)
   piece.exchange = static_cast<double>(member.Whole("exchange", 0, MostExchanges, 0));
   piece.exchangesWire = member.Has("exchange_wire");
   piece.wire = static_cast<double>(member.Whole("exchange_wire", 0, MostExchanges, 0));
+  piece.setsBreaths = member.Has("breaths_per_min");
+  piece.breaths = member.Number("breaths_per_min", 0.0, MaximumBreaths, 0.0);
   member.Done();
   return piece;
 }
@@ -163,6 +166,11 @@ std::vector<double> DriveScript::Exchanges(double from, double to) const
 std::vector<double> DriveScript::WireExchanges(double from, double to) const
 {
   return this->Chosen(from, to, &DrivePiece::exchangesWire, &DrivePiece::wire);
+}
+
+std::vector<double> DriveScript::BreathRates(double from, double to) const
+{
+  return this->Chosen(from, to, &DrivePiece::setsBreaths, &DrivePiece::breaths);
 }
 
 DriveScript DriveScriptOf(JsonFields& fields, PiecesOf form)

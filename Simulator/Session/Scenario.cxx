@@ -106,6 +106,11 @@ std::vector<NumberEntry> NumbersOf(ContrastSettings& s)
     { "flow_depression", &s.flowDepression, 0.0, 1.0 } };
 }
 
+std::vector<NumberEntry> NumbersOf(BreathingSettings& s)
+{
+  return { { "rate_per_min", &s.rate, 0.0, 60.0 }, { "amplitude_mm", &s.amplitude, 0.0, 40.0 } };
+}
+
 void ReadNumbers(JsonFields& fields, const std::vector<NumberEntry>& entries)
 {
   for (const NumberEntry& entry : entries)
@@ -381,12 +386,21 @@ ImagingSettings ImagingOf(const Json& object, const std::string& where, const st
       fields.Refuse(std::string("has '") + name + "' that is none of 7.5, 15, 30");
     }
   }
+  imaging.exposureControl = fields.Flag("exposure_control", imaging.exposureControl);
+  imaging.heartShadowMoves = fields.Flag("heart_shadow_moves", imaging.heartShadowMoves);
+  if (fields.Has("breathing"))
+  {
+    JsonFields breathing(fields.Object("breathing"), where + ", breathing");
+    ReadNumbers(breathing, NumbersOf(imaging.breathing));
+    breathing.Done();
+  }
   fields.Done();
   return imaging;
 }
 
 Json ImagingToJson(const ImagingSettings& imaging)
 {
+  BreathingSettings breathing = imaging.breathing;
   const auto list = [](const Vector3& point) { return Json{ point.x(), point.y(), point.z() }; };
   Json json = { { "background", imaging.background }, { "background_run", imaging.backgroundRun },
     { "background_offset_mm", list(imaging.backgroundOffset) },
@@ -396,7 +410,10 @@ Json ImagingToJson(const ImagingSettings& imaging)
     { "source_to_detector_mm", imaging.pose.sourceToDetector },
     { "field_of_view_mm", imaging.fieldOfView }, { "columns", imaging.columns },
     { "energy_keV", imaging.energy }, { "iodine_mg_mL", imaging.iodine },
-    { "frame_rate_hz", imaging.frameRate }, { "cine_rate_hz", imaging.cineRate } };
+    { "frame_rate_hz", imaging.frameRate }, { "cine_rate_hz", imaging.cineRate },
+    { "exposure_control", imaging.exposureControl },
+    { "heart_shadow_moves", imaging.heartShadowMoves },
+    { "breathing", WriteNumbers(NumbersOf(breathing)) } };
   if (imaging.hasIsocentre)
   {
     json["isocentre_mm"] = list(imaging.pose.isocentre);
@@ -515,6 +532,13 @@ bool BeginsArtery(const std::string& name, const std::string& artery)
 }
 }
 
+bool SamePatient(const ImagingSettings& a, const ImagingSettings& b)
+{
+  return a.background == b.background && a.backgroundRun == b.backgroundRun &&
+    a.backgroundOffset == b.backgroundOffset && a.thoraxSeed == b.thoraxSeed &&
+    a.energy == b.energy;
+}
+
 const char* NameOf(ProcedureStep::Goal goal, const char*& value)
 {
   for (const GoalName& one : GoalNames)
@@ -623,6 +647,21 @@ Scenario ScenarioFromText(
     static_cast<std::uint64_t>(fields.Whole("seed", 0, static_cast<std::int64_t>(MaximumSeed), 1));
   fields.Done();
   return scenario;
+}
+
+Scenario RecordedScenario(const std::string& text, const std::string& origin)
+{
+  Json json = ParseBoundedJson(text, origin);
+  if (json.is_object() && json.contains("imaging") && json["imaging"].is_object())
+  {
+    const Json before = { { "exposure_control", false }, { "heart_shadow_moves", false },
+      { "breathing", { { "rate_per_min", 0.0 }, { "amplitude_mm", 0.0 } } } };
+    for (const auto& [key, value] : before.items())
+    {
+      json["imaging"].emplace(key, value);
+    }
+  }
+  return ScenarioFromText(json.dump(), origin, ".");
 }
 
 std::string ScenarioText(const Scenario& scenario)

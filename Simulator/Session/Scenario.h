@@ -6,6 +6,7 @@
 #ifndef DynamicCoronary_Scenario_h
 #define DynamicCoronary_Scenario_h
 
+#include "Breathing.h"
 #include "CArm.h"
 #include "ContrastModel.h"
 #include "Instrument.h"
@@ -31,14 +32,20 @@ struct ImagingSettings
   Vector3 backgroundOffset{ Vector3::Zero() }; ///< mm that the CT is moved to fit the vessels
   std::uint64_t thoraxSeed = 1;                ///< of the thorax phantom
   CArmPose pose; ///< with the isocentre in the middle of the vessels, unless it is given
-  bool hasIsocentre = false;  ///< pose.isocentre is given, LPS, mm
-  double fieldOfView = 200.0; ///< mm of the detector, across, 80 to 400
-  int columns = 512;          ///< of the image, and rows, 64 to 2048
-  double energy = 60.0;       ///< keV, effective, 30 to 120
-  double iodine = 350.0;      ///< mg/mL of the contrast medium, 0 to 500
-  double frameRate = 15.0;    ///< Hz of fluoroscopy: 7.5, 15 or 30
-  double cineRate = 15.0;     ///< Hz of cine
+  bool hasIsocentre = false;    ///< pose.isocentre is given, LPS, mm
+  double fieldOfView = 200.0;   ///< mm of the detector, across, 80 to 400
+  int columns = 512;            ///< of the image, and rows, 64 to 2048
+  double energy = 60.0;         ///< keV, effective, 30 to 120
+  double iodine = 350.0;        ///< mg/mL of the contrast medium, 0 to 500
+  double frameRate = 15.0;      ///< Hz of fluoroscopy: 7.5, 15 or 30
+  double cineRate = 15.0;       ///< Hz of cine
+  bool exposureControl = true;  ///< dose follows the patient's thickness
+  bool heartShadowMoves = true; ///< with the arteries; false: as in the CT
+  BreathingSettings breathing;
 };
+
+/// Whether what is seen behind the vessels is one and the same.
+bool SamePatient(const ImagingSettings& a, const ImagingSettings& b);
 
 /// Of a procedure: what is to be done before the next one.
 struct ProcedureStep
@@ -92,6 +99,10 @@ struct Scenario
  */
 Scenario ScenarioFromText(
   const std::string& text, const std::string& origin, const std::string& folder);
+
+/// Of a recording's header: what a recording of before its time does not know was not there.
+/// @throws as ScenarioFromText
+Scenario RecordedScenario(const std::string& text, const std::string& origin);
 
 /// @param number  0: the session begins with it; else of its exchanges; null: there is none
 const BalloonCatheter* BalloonOf(const Scenario& scenario, std::size_t number);

@@ -108,8 +108,8 @@ SessionEngine::SessionEngine(
   : Options(std::move(options))
   , TickRate(world.scenario.settings.tickRate)
   , Mux(std::move(mux))
-  , Runner(world.wall, world.scenario, world.wallHash, this->MakeSource())
-  , Imager(world.wall->Topology(), world.scenario, world.background, true)
+  , Runner(world.wall, world.scenario, world.wallHash, this->MakeSource(), world.measured)
+  , Imager(world.wall->Topology(), world.scenario, world.background, true, world.moving)
   , Runs(world.scenario, "coronary-simulator " DYNAMICCORONARY_VERSION)
   , TicksPerScene(std::max<std::uint64_t>(
       1, static_cast<std::uint64_t>(std::lround(this->TickRate / this->Options.sceneRate))))

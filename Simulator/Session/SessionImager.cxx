@@ -25,6 +25,8 @@ constexpr double InnerTube =
 constexpr double MarkerThickness = 0.04; // mm of platinum
 constexpr double BlushSigma = 7.0;       // mm of the myocardium behind an outlet
 constexpr double FaintestBlush = 1e-5;   // mL
+constexpr double CoarseThorax = 4.0;     // mm between the voxels that the exposure control sees
+constexpr std::size_t MemoryOfPart = 32U << 20U; // bytes of shadows that are kept
 
 /// Where a branch leaves its parent: number of the nearest point of the parent's axis.
 std::size_t Attachment(const WallTopology& topology, std::size_t branch)
@@ -106,6 +108,16 @@ CArmPose StartPose(const WallTopology& topology, const ImagingSettings& imaging)
 
 namespace
 {
+std::vector<Vector3> PointsOfAxis(const WallTopology& topology)
+{
+  std::vector<Vector3> points;
+  for (const std::vector<Vector3>& branch : topology.axis)
+  {
+    points.insert(points.end(), branch.begin(), branch.end());
+  }
+  return points;
+}
+
 /// "12.3 mL" of so many voxels.
 std::string Millilitres(std::int64_t voxels, const ImageGrid& grid)
 {
@@ -179,6 +191,23 @@ SessionBackground LoadPatient(const ImagingSettings& imaging, const ProgressCall
   }
   return patient;
 }
+
+/// About the arteries.
+HounsfieldVolume ThoraxOf(const Scenario& scenario, const WallTopology& topology, double spacing,
+  const ProgressCallback& progress)
+{
+  ThoraxSettings settings;
+  settings.seed = scenario.imaging.thoraxSeed;
+  settings.spacing = spacing;
+  HounsfieldVolume volume = MakeThoraxPhantom(settings, progress);
+  Vector3 offset = scenario.imaging.backgroundOffset;
+  if (scenario.vessels.kind != VesselSource::Kind::Phantom)
+  {
+    offset += MiddleOfVessels(topology) - HeartFrame().ToWorld(HeartFrame::Centre);
+  }
+  volume.grid.origin += offset;
+  return volume;
+}
 }
 
 SessionBackground LoadBackground(
@@ -189,17 +218,7 @@ SessionBackground LoadBackground(
   {
     return LoadPatient(imaging, progress);
   }
-  ThoraxSettings settings;
-  settings.seed = imaging.thoraxSeed;
-  SessionBackground thorax;
-  thorax.volume = MakeThoraxPhantom(settings, progress);
-  Vector3 offset = imaging.backgroundOffset;
-  if (scenario.vessels.kind != VesselSource::Kind::Phantom)
-  {
-    offset += MiddleOfVessels(topology) - HeartFrame().ToWorld(HeartFrame::Centre);
-  }
-  thorax.volume.grid.origin += offset;
-  return thorax;
+  return { ThoraxOf(scenario, topology, ThoraxSettings().spacing, progress), {} };
 }
 
 std::shared_ptr<const VolumeProjector> MakeProjector(
@@ -210,21 +229,66 @@ std::shared_ptr<const VolumeProjector> MakeProjector(
     [&materials](double hounsfield) { return materials.OfHounsfield(hounsfield); });
 }
 
+std::shared_ptr<const MovingParts> MovingPartsOf(const HounsfieldVolume& background,
+  const WallTopology& topology, const ImagingSettings& imaging, const ProgressCallback& progress)
+{
+  if (!imaging.heartShadowMoves && imaging.breathing.amplitude == 0.0)
+  {
+    return nullptr;
+  }
+  Vector3 base = Vector3::Zero();
+  double roots = 0.0;
+  for (std::size_t b = 0; b < topology.axis.size(); ++b)
+  {
+    if (topology.parent[b] < 0)
+    {
+      base += topology.axis[b].front();
+      roots += 1.0;
+    }
+  }
+  const Attenuation materials(imaging.energy);
+  return std::make_shared<MovingParts>(FindMovingParts(
+    background, HeartAbout(PointsOfAxis(topology), base / roots),
+    [&materials](double hounsfield) { return materials.OfHounsfield(hounsfield); }, progress));
+}
+
+std::shared_ptr<const VolumeProjector> MeasuredThorax(
+  const Scenario& scenario, const WallTopology& topology)
+{
+  return MakeProjector(ThoraxOf(scenario, topology, CoarseThorax, {}), scenario.imaging);
+}
+
 SessionImager::SessionImager(const WallTopology& topology, const Scenario& scenario,
-  std::shared_ptr<const VolumeProjector> background, bool worker)
+  std::shared_ptr<const VolumeProjector> background, bool worker,
+  std::shared_ptr<const MovingParts> moving)
   : Scenario_(scenario)
   , Radii(topology.axisRadius)
   , Hidden(HiddenLengths(topology))
   , Materials(scenario.imaging.energy)
   , NeatContrast(this->Materials.OfContrastMedium(scenario.imaging.iodine))
+  , AxisAtRest(PointsOfAxis(topology))
   , Images_({}, scenario.seed)
 {
   BackgroundCacheSettings settings;
   settings.worker = worker;
   this->Background = std::make_unique<BackgroundCache>(std::move(background), settings);
+  settings.memory = MemoryOfPart;
+  const auto take = [&settings](const MovingPart& part, std::optional<Part>& own)
+  {
+    if (part.projector)
+    {
+      own.emplace(Part{ part.middle, std::make_unique<BackgroundCache>(part.projector, settings) });
+    }
+  };
+  if (moving)
+  {
+    this->Place = moving->place;
+    take(moving->heart, this->Heart);
+    take(moving->diaphragm, this->Diaphragm);
+  }
   this->InstrumentLayer = LineIntegrals(scenario.imaging.columns, scenario.imaging.columns);
   this->ContrastLayer = this->InstrumentLayer;
-  this->NoBackground = this->InstrumentLayer;
+  this->BackgroundLayer = this->InstrumentLayer;
 }
 
 SessionImager::~SessionImager() = default;
@@ -246,11 +310,49 @@ const GreyImage& SessionImager::Expose(const SessionSnapshot& snapshot)
 {
   const CArmGeometry geometry = this->GeometryOf(snapshot.pose, snapshot.fieldOfView);
   this->Background->SetGeometry(geometry);
-  this->ProjectInstruments(snapshot, geometry);
-  this->ProjectContrast(snapshot, geometry);
-  const auto background = this->Background->Current(&this->Completeness);
-  return this->Images_.Expose(background ? *background : this->NoBackground, this->InstrumentLayer,
-    this->ContrastLayer, snapshot.exposure);
+  // The heart and all that is in its vessels moves as a whole: as if the C-arm moved the other way.
+  CArmPose pose = geometry.Pose();
+  pose.isocentre -= HeartShift(snapshot.diaphragm);
+  const CArmGeometry ofHeart(pose, geometry.Format());
+  this->ProjectInstruments(snapshot, ofHeart);
+  this->ProjectContrast(snapshot, ofHeart);
+  this->MoveBackground(snapshot, geometry);
+  return this->Images_.Expose(
+    this->BackgroundLayer, this->InstrumentLayer, this->ContrastLayer, snapshot.exposure);
+}
+
+/// The shadows of its parts are begun one after the other when the whole is finished.
+void SessionImager::MoveBackground(const SessionSnapshot& snapshot, const CArmGeometry& geometry)
+{
+  const auto whole = this->Background->Current(&this->Completeness);
+  if (!whole)
+  {
+    std::fill(this->BackgroundLayer.values.begin(), this->BackgroundLayer.values.end(), 0.0F);
+    return;
+  }
+  this->BackgroundLayer = *whole;
+  double finished = this->Completeness;
+  const auto move = [&](std::optional<Part>& part, const AffineMotion& motion)
+  {
+    if (!part || finished < 1.0 || motion.IsRest())
+    {
+      return;
+    }
+    part->shadow->SetGeometry(geometry);
+    const auto shadow = part->shadow->Current(&finished);
+    if (shadow && finished == 1.0)
+    {
+      AddMotion(*shadow, geometry, part->middle, motion, this->BackgroundLayer);
+    }
+  };
+  AffineMotion beat;
+  if (this->Scenario_.imaging.heartShadowMoves)
+  {
+    beat = AcrossHeart(MotionOf(this->AxisAtRest, snapshot.axis), this->Place);
+  }
+  beat.shift += HeartShift(snapshot.diaphragm);
+  move(this->Heart, beat);
+  move(this->Diaphragm, { Matrix3::Identity(), DiaphragmShift(snapshot.diaphragm) });
 }
 
 void SessionImager::ProjectInstruments(

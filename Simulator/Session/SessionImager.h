@@ -10,6 +10,7 @@
 #include "ContrastProjector.h"
 #include "FluoroscopyImager.h"
 #include "InstrumentProjector.h"
+#include "MovingParts.h"
 #include "Scenario.h"
 #include "ThoraxPhantom.h"
 #include "TrainingSession.h"
@@ -17,6 +18,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,6 +50,16 @@ SessionBackground LoadBackground(
 std::shared_ptr<const VolumeProjector> MakeProjector(
   const HounsfieldVolume& background, const ImagingSettings& imaging);
 
+/// What of it moves as the scenario wants; null: nothing.
+/// @throws as FindMovingParts
+std::shared_ptr<const MovingParts> MovingPartsOf(const HounsfieldVolume& background,
+  const WallTopology& topology, const ImagingSettings& imaging,
+  const ProgressCallback& progress = {});
+
+/// The thorax phantom coarsely, as the exposure control measures it: soon made.
+std::shared_ptr<const VolumeProjector> MeasuredThorax(
+  const Scenario& scenario, const WallTopology& topology);
+
 /**
  * Background, instruments and contrast medium are line integrals of their own and are added before the exponential.
  * Used by one thread.
@@ -58,9 +70,11 @@ public:
   /**
    * @param worker      the background is refined beside the images (not deterministic in time); false: it is finished before
    *                    an image is made
+   * @param moving      of the background; null: it stands still
    */
   SessionImager(const WallTopology& topology, const Scenario& scenario,
-    std::shared_ptr<const VolumeProjector> background, bool worker);
+    std::shared_ptr<const VolumeProjector> background, bool worker,
+    std::shared_ptr<const MovingParts> moving = nullptr);
   ~SessionImager();
 
   /// Where the C-arm will be looked from next: the background is begun.
@@ -92,17 +106,29 @@ private:
   void ProjectBalloon(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   void ProjectStents(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   void ProjectContrast(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
+  void MoveBackground(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
+
+  /// Of the background, with its shadow at rest.
+  struct Part
+  {
+    Vector3 middle;
+    std::unique_ptr<BackgroundCache> shadow;
+  };
 
   Scenario Scenario_;
   std::vector<std::vector<double>> Radii; ///< of the axis
   std::vector<double> Hidden;             ///< mm at each branch's beginning that lie in its parent
   Attenuation Materials;
-  double NeatContrast; ///< 1/mm
+  double NeatContrast;             ///< 1/mm
+  std::vector<Vector3> AxisAtRest; ///< as SessionSnapshot::axis
   std::unique_ptr<BackgroundCache> Background;
+  HeartPlace Place;
+  std::optional<Part> Heart;     ///< none: it stands still
+  std::optional<Part> Diaphragm; ///< likewise
   FluoroscopyImager Images_;
   LineIntegrals InstrumentLayer;
   LineIntegrals ContrastLayer;
-  LineIntegrals NoBackground;
+  LineIntegrals BackgroundLayer; ///< of this moment
   double Completeness = 0.0;
   std::vector<ContrastBranch> Branches;
 };

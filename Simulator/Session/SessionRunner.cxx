@@ -27,6 +27,10 @@ std::vector<RecordedEvent> EventsOf(const DriveScript& script, double from, doub
   {
     events.push_back({ RecordedEvent::ExchangeWire, number });
   }
+  for (const double rate : script.BreathRates(from, to))
+  {
+    events.push_back({ RecordedEvent::Breaths, rate });
+  }
   return events;
 }
 
@@ -63,13 +67,15 @@ bool ScriptSource::At(std::uint64_t tick, SessionInput& input, std::vector<Recor
 }
 
 SessionRunner::SessionRunner(std::shared_ptr<WallMotion> wall, const Scenario& scenario,
-  std::uint64_t wallHash, std::unique_ptr<TickSource> source)
-  : Training(std::move(wall), scenario)
+  std::uint64_t wallHash, std::unique_ptr<TickSource> source,
+  std::shared_ptr<const VolumeProjector> patient)
+  : Training(std::move(wall), scenario, patient)
   , Setting(scenario)
   , WallHash(wallHash)
   , Source(std::move(source))
   , Input(this->Training.StartInput())
 {
+  this->Setting.imaging.exposureControl = scenario.imaging.exposureControl && patient;
   for (std::atomic<double>& posted : this->Posted)
   {
     posted = Nothing;

@@ -90,9 +90,9 @@ struct HashComparison
 class SessionRunner
 {
 public:
-  /// @throws as TrainingSession
+  /// @param patient  as TrainingSession's; a recording says whether there was one  @throws as TrainingSession
   SessionRunner(std::shared_ptr<WallMotion> wall, const Scenario& scenario, std::uint64_t wallHash,
-    std::unique_ptr<TickSource> source);
+    std::unique_ptr<TickSource> source, std::shared_ptr<const VolumeProjector> patient = nullptr);
 
   ///@{
   /// Set before the first tick; may be empty.
@@ -125,7 +125,7 @@ public:
   std::uint64_t UnknownEvents() const { return this->Unknown; }
 
 private:
-  static constexpr std::size_t EventKinds = RecordedEvent::ExchangeWire + 1; // the last kind
+  static constexpr std::size_t EventKinds = RecordedEvent::Breaths + 1; // the last kind
 
   bool Step();
   void TakePosted();

@@ -7,6 +7,7 @@
 #include "VesselModel.h"
 
 #include <exception>
+#include <optional>
 
 namespace coronary
 {
@@ -25,16 +26,18 @@ SessionWorld LoadWorld(const Scenario& scenario, bool background, const WorldPro
   SessionWorld world;
   world.scenario = scenario;
   std::vector<std::string> notes;
+  std::optional<SessionBackground> patient;
   const auto loadPatient = [&](const Scenario& wanted, const WallTopology& topology)
   {
-    const SessionBackground made = LoadBackground(wanted, topology, step("patient"));
-    notes.insert(notes.end(), made.notes.begin(), made.notes.end());
-    world.background = MakeProjector(made.volume, wanted.imaging);
+    patient = LoadBackground(wanted, topology, step("patient"));
+    notes.insert(notes.end(), patient->notes.begin(), patient->notes.end());
+    world.background = MakeProjector(patient->volume, wanted.imaging);
   };
   // A CT lies where it lies: what is wrong with it is told before the vessels are made, which takes longer.
   Scenario withThorax = scenario;
   withThorax.imaging.background.clear();
-  if (background && !scenario.imaging.background.empty())
+  const bool controlled = scenario.imaging.exposureControl;
+  if ((background || controlled) && !scenario.imaging.background.empty())
   {
     try
     {
@@ -71,9 +74,21 @@ SessionWorld LoadWorld(const Scenario& scenario, bool background, const WorldPro
       "The vessels have no aorta (of a run: aorta_wall.vtp): the guide catheter is "
       "rigid in the ostium.");
   }
+  if (controlled)
+  {
+    world.measured = world.background ? world.background : MeasuredThorax(withThorax, topology);
+  }
   if (background && !world.background)
   {
     loadPatient(withThorax, topology);
+  }
+  if (background)
+  {
+    world.moving = MovingPartsOf(patient->volume, topology, scenario.imaging);
+  }
+  else
+  {
+    world.background.reset();
   }
   world.notes.insert(world.notes.end(), notes.begin(), notes.end());
   return world;

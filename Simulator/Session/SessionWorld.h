@@ -5,6 +5,7 @@
 #ifndef DynamicCoronary_SessionWorld_h
 #define DynamicCoronary_SessionWorld_h
 
+#include "MovingParts.h"
 #include "PatientHeart.h"
 #include "Scenario.h"
 #include "VolumeProjector.h"
@@ -25,8 +26,10 @@ struct SessionWorld
   std::uint64_t wallHash = 0;
   std::shared_ptr<const PatientHeart> heart;         ///< null: not known
   std::shared_ptr<const VolumeProjector> background; ///< null: not asked for
-  std::string motion;                                ///< for people: "tracked at 20 moments"
-  std::vector<std::string> notes;                    ///< what was assumed, a sentence each
+  std::shared_ptr<const MovingParts> moving;         ///< of the background; null: nothing moves
+  std::shared_ptr<const VolumeProjector> measured; ///< by the exposure control; null: there is none
+  std::string motion;                              ///< for people: "tracked at 20 moments"
+  std::vector<std::string> notes;                  ///< what was assumed, a sentence each
   std::string foreignMotion; ///< what of the motion is not the patient's; empty: nothing
 };
 
@@ -34,6 +37,7 @@ struct SessionWorld
 /// @return false: cancel
 using WorldProgress = std::function<bool(const std::string& what, double fraction)>;
 
+/// A CT is read for the exposure control, too: doses do not depend on whether images are wanted.
 /// @throws as LoadVessels, LoadBackground; Cancelled
 SessionWorld LoadWorld(const Scenario& scenario, bool background, const WorldProgress& progress);
 }

@@ -1,5 +1,7 @@
 #include "TrainingSession.h"
 
+#include "Attenuation.h"
+#include "ExposureControl.h"
 #include "Fnv1a.h"
 #include "HandAxes.h"
 #include "Numbers.h"
@@ -66,7 +68,8 @@ AcquisitionSettings AcquisitionOf(const Scenario& scenario)
 
 struct TrainingSession::Internals
 {
-  Internals(std::shared_ptr<WallMotion> motion, const Scenario& scenario)
+  Internals(std::shared_ptr<WallMotion> motion, const Scenario& scenario,
+    std::shared_ptr<const VolumeProjector> patient)
     : Wall(std::move(motion))
     , Settings(WithRoot(*this->Wall, scenario))
     , Imaging(scenario.imaging)
@@ -75,6 +78,7 @@ struct TrainingSession::Internals
     , Watch(this->Wall->Topology(), this->Medium)
     , Heart(this->Medium.FlowModel())
     , Clock(AcquisitionOf(scenario))
+    , Breath(scenario.imaging.breathing)
     , HeartRate(this->Settings.heartRate)
     , TicksOfContrast(std::max<std::uint64_t>(
         1, static_cast<std::uint64_t>(std::lround(this->Settings.tickRate * ContrastStep))))
@@ -85,6 +89,11 @@ struct TrainingSession::Internals
     this->Pose = scenario.imaging.pose;
     this->SetField();
     this->Artery = scenario.artery == "any" ? "artery" : scenario.artery;
+    if (patient && this->Imaging.exposureControl)
+    {
+      this->Control.emplace(
+        std::move(patient), Attenuation(this->Imaging.energy).Of(XRayMaterial::Water));
+    }
     this->Steps = scenario.procedure;
     this->Procedure.emplace(this->Steps, this->Wall->Topology(),
       this->Watch.Results(this->Physics, this->Medium), scenario.balloon.has_value());
@@ -102,6 +111,8 @@ struct TrainingSession::Internals
 
   void SetView(const SessionInput& input);
   void SetField();
+  DetectorFormat Format() const;
+  void ControlExposure(const SessionInput& input);
   void StepContrast(const SessionInput& input);
   void StepIschaemia(double seconds);
   void Measure(const SessionInput& input);
@@ -142,6 +153,9 @@ struct TrainingSession::Internals
   std::vector<Guidewire> Wires;
   std::size_t WireNumber = 0;
   ExposureClock Clock;
+  std::optional<ExposureControl> Control; // none: the dose is always the same
+  std::optional<std::pair<CArmPose, DetectorFormat>> Measured;
+  Breathing Breath;
   double HeartRate;
   std::uint64_t TicksOfContrast;
   std::uint64_t TicksOfProcedure;
@@ -158,12 +172,30 @@ struct TrainingSession::Internals
   std::uint64_t Tick = 0;
 };
 
+DetectorFormat TrainingSession::Internals::Format() const
+{
+  return { this->Imaging.columns, this->Imaging.columns, this->Field, this->Field };
+}
+
 void TrainingSession::Internals::SetField()
 {
-  DetectorFormat format;
-  format.columns = format.rows = this->Imaging.columns;
-  format.width = format.height = this->Field;
-  this->Clock.SetFieldArea(ReferenceFieldArea(this->Pose, format));
+  this->Clock.SetFieldArea(ReferenceFieldArea(this->Pose, this->Format()));
+}
+
+/// Looks through the patient when a frame is due from another view than the last one's.
+void TrainingSession::Internals::ControlExposure(const SessionInput& input)
+{
+  if (!this->Control || (input.pedals & (FluoroscopyPedal | CinePedal)) == 0 ||
+    !this->Clock.IsDue())
+  {
+    return;
+  }
+  const std::pair view(this->Pose, this->Format());
+  if (this->Measured != view)
+  {
+    this->Clock.SetView(this->Control->Of(view.first, view.second));
+    this->Measured = view;
+  }
 }
 
 void TrainingSession::Internals::SetView(const SessionInput& input)
@@ -403,8 +435,9 @@ SessionInput StartInputOf(const Scenario& scenario)
   return input;
 }
 
-TrainingSession::TrainingSession(std::shared_ptr<WallMotion> wall, const Scenario& scenario)
-  : Data(std::make_unique<Internals>(std::move(wall), scenario))
+TrainingSession::TrainingSession(std::shared_ptr<WallMotion> wall, const Scenario& scenario,
+  std::shared_ptr<const VolumeProjector> patient)
+  : Data(std::make_unique<Internals>(std::move(wall), scenario, std::move(patient)))
 {
   this->Data->Last = this->Data->Start = StartInputOf(scenario);
 }
@@ -426,6 +459,8 @@ const SessionReport& TrainingSession::Step(const SessionInput& input)
     data.StepContrast(input);
   }
   ++data.Tick;
+  data.Breath.Step(1.0 / data.Settings.tickRate);
+  data.ControlExposure(input);
   data.Report.exposed = data.Clock.Step((input.pedals & FluoroscopyPedal) != 0,
     (input.pedals & CinePedal) != 0, (input.pedals & MaskPedal) != 0);
   data.Measure(input);
@@ -461,6 +496,9 @@ bool TrainingSession::Apply(const RecordedEvent& event)
       return data.Exchange(event.value, data.Balloons, data.BalloonNumber, "balloon");
     case RecordedEvent::ExchangeWire:
       return data.Exchange(event.value, data.Wires, data.WireNumber, "wire");
+    case RecordedEvent::Breaths:
+      data.Breath.SetRate(std::clamp(event.value, 0.0, Breathing::FastestRate));
+      return true;
     default:
       return false;
   }
@@ -576,6 +614,7 @@ void TrainingSession::SnapshotOfImage(SessionSnapshot& snapshot) const
   snapshot.pose = data.Pose;
   snapshot.fieldOfView = data.Field;
   snapshot.frameRate = FramesPerSecond(data.Clock.Settings().fluoroscopyRate);
+  snapshot.diaphragm = data.Breath.Diaphragm();
   snapshot.radiating = data.Clock.Radiating();
   snapshot.exposure = data.Clock.Last();
   snapshot.wire = data.Physics.Centerline();

@@ -7,6 +7,7 @@
 #define DynamicCoronary_TrainingSession_h
 
 #include "Acquisition.h"
+#include "Breathing.h"
 #include "CArm.h"
 #include "ContrastModel.h"
 #include "Intervention.h"
@@ -16,6 +17,7 @@
 #include "Scenario.h"
 #include "SessionInput.h"
 #include "SessionMetrics.h"
+#include "VolumeProjector.h"
 
 #include <cstdint>
 #include <memory>
@@ -47,6 +49,7 @@ struct SessionSnapshot
   CArmPose pose;
   double fieldOfView = 0.0; ///< mm
   double frameRate = 0.0;   ///< Hz, of fluoroscopy
+  double diaphragm = 0.0;   ///< mm below its place at the end of expiration
   bool radiating = false;
   Exposure exposure;                 ///< the last one
   std::size_t wireNumber = 0;        ///< as WireOf
@@ -89,8 +92,10 @@ RecordedForces ForcesOf(const TickReport& report);
 class TrainingSession
 {
 public:
+  /// @param patient  that the exposure control measures; null: dose is as without control
   /// @throws std::invalid_argument naming what is wrong with vessels, scenario, instruments
-  TrainingSession(std::shared_ptr<WallMotion> wall, const Scenario& scenario);
+  TrainingSession(std::shared_ptr<WallMotion> wall, const Scenario& scenario,
+    std::shared_ptr<const VolumeProjector> patient = nullptr);
   ~TrainingSession();
   TrainingSession(const TrainingSession&) = delete;
   TrainingSession& operator=(const TrainingSession&) = delete;

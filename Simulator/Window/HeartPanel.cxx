@@ -8,12 +8,13 @@
 namespace coronary
 {
 HeartPanel::HeartPanel()
-  : QGroupBox("Heart")
+  : QGroupBox("Heart and breath")
 {
   this->Rate->setRange(40, 140);
   auto* form = new QFormLayout(this);
   form->addRow(this->Text, this->Rate);
   form->addRow(this->Pause);
+  form->addRow(this->Hold);
   const auto choose = [this]
   {
     const double rate = this->Pause->isChecked() ? 0.0 : this->Rate->value();
@@ -22,6 +23,17 @@ HeartPanel::HeartPanel()
   };
   QObject::connect(this->Rate, &QSlider::valueChanged, [choose](int) { choose(); });
   QObject::connect(this->Pause, &QCheckBox::toggled, [choose](bool) { choose(); });
+  QObject::connect(this->Hold, &QCheckBox::toggled,
+    [this](bool held) {
+      this->chosen({ RecordedEvent::Breaths, held ? 0.0 : this->Breaths });
+    });
+}
+
+void HeartPanel::ShowBreaths(double rate)
+{
+  const QSignalBlocker silence(this->Hold);
+  this->Hold->setChecked(rate <= 0.0);
+  this->Breaths = rate > 0.0 ? rate : this->Breaths;
 }
 
 void HeartPanel::ShowRate(double rate)

@@ -321,6 +321,7 @@ void SessionWindow::ShowScenario()
     this->World.scenario, this->World.wall->Topology().aorta != nullptr);
   this->XRay->ShowScenario(this->World.scenario.imaging);
   this->Heart->ShowRate(this->World.scenario.settings.heartRate);
+  this->Heart->ShowBreaths(this->World.scenario.imaging.breathing.rate);
 }
 
 /// For this session, if there is one, and for the next ones.
@@ -329,6 +330,7 @@ void SessionWindow::Chosen(const RecordedEvent& event)
   Scenario& scenario = this->World.scenario;
   (event.kind == RecordedEvent::HeartRate      ? scenario.settings.heartRate
       : event.kind == RecordedEvent::FrameRate ? scenario.imaging.frameRate
+      : event.kind == RecordedEvent::Breaths   ? scenario.imaging.breathing.rate
                                                : scenario.imaging.fieldOfView) = event.value;
   if (this->Engine)
   {
@@ -385,6 +387,12 @@ void SessionWindow::TakeScenarioOf(const std::string& recording)
   options.replay = recording;
   Scenario scenario = ScenarioOf(options);
   CheckRecording(recording, scenario, this->World.wallHash, false);
+  if (scenario.imaging.exposureControl &&
+    (!this->World.measured || !SamePatient(scenario.imaging, this->World.scenario.imaging)))
+  {
+    throw std::runtime_error("'" + recording +
+      "' was recorded with another patient, whose thickness sets the dose: start with --replay.");
+  }
   scenario.imaging.pose = StartPose(this->World.wall->Topology(), scenario.imaging);
   this->World.scenario = scenario;
   this->ShowScenario();

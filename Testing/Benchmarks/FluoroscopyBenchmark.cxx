@@ -4,7 +4,9 @@
 #include "CArm.h"
 #include "ContrastProjector.h"
 #include "CounterRandom.h"
+#include "ExposureControl.h"
 #include "InstrumentProjector.h"
+#include "MovingParts.h"
 #include "ParallelFor.h"
 #include "VolumeProjector.h"
 
@@ -101,6 +103,36 @@ BENCHMARK(RadiographOnAllThreads)
   ->Args({ 512, 45, 20 })
   ->UseRealTime()
   ->Unit(benchmark::kMillisecond);
+
+// What the exposure control asks of the physics thread when the C-arm has moved.
+void ExposureOfView(benchmark::State& state)
+{
+  const ExposureControl control(Thorax(), 0.0206);
+  CArmPose pose;
+  for (auto _ : state)
+  {
+    pose.primary = pose.primary > 0.8 ? -0.8 : pose.primary + 0.01;
+    benchmark::DoNotOptimize(control.Of(pose, {}).kerma);
+  }
+}
+BENCHMARK(ExposureOfView)->Unit(benchmark::kMicrosecond);
+
+// The shadow of heart or diaphragm in every image.
+void MovedPart(benchmark::State& state)
+{
+  const CArmGeometry geometry = Geometry(-30, 20, 512);
+  const LineIntegrals part(512, 512);
+  LineIntegrals image(512, 512);
+  AffineMotion motion;
+  motion.linear *= 0.95;
+  motion.shift = { 1.0, -2.0, -6.0 };
+  for (auto _ : state)
+  {
+    AddMotion(part, geometry, Vector3::Zero(), motion, image);
+    benchmark::DoNotOptimize(image.values.data());
+  }
+}
+BENCHMARK(MovedPart)->Unit(benchmark::kMicrosecond);
 
 // A wire of 0.36 mm that winds through the field of view.
 InstrumentChain Wire(int segments)

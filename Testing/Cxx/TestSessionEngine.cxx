@@ -289,6 +289,39 @@ TEST_F(TestSessionEngine, AReplayThatIsChangedByHandGoesOnAndIsNotComparedAnyMor
   }
 }
 
+TEST_F(TestSessionEngine, RecordsWhetherThePatientSetsTheDose)
+{
+  const Scenario& scenario = World().scenario;
+  for (const bool controlled : { true, false })
+  {
+    const std::string file = this->Path("a.pcirec");
+    const auto patient = controlled ? World().background : nullptr;
+    SessionRunner runner(World().wall, scenario, World().wallHash,
+      std::make_unique<ScriptSource>(
+        Driving(), StartInputOf(scenario), scenario.settings.tickRate, false),
+      patient);
+    runner.maximumTicks = 2500;
+    runner.Record(file, "test", "");
+    while (runner.Run(64))
+    {
+    }
+    runner.FinishRecording();
+    const Scenario recorded =
+      RecordedScenario(RecordingReader(file).Header().scenario, "'a.pcirec'");
+    EXPECT_EQ(recorded.imaging.exposureControl, controlled);
+    // With the same patient it repeats; a recording without one needs none.
+    SessionRunner again(World().wall, recorded, World().wallHash,
+      std::make_unique<ReplaySource>(file), World().background);
+    EXPECT_FALSE(again.Run(10000));
+    EXPECT_EQ(again.Compared().compared, 3U);
+    EXPECT_EQ(again.Compared().equal, 3U);
+    SessionRunner without(
+      World().wall, recorded, World().wallHash, std::make_unique<ReplaySource>(file));
+    EXPECT_FALSE(without.Run(10000));
+    EXPECT_EQ(without.Compared().equal == 3U, !controlled);
+  }
+}
+
 TEST_F(TestSessionEngine, PausesAreNotMadeUpFor)
 {
   std::atomic<double> time{ 0.0 };

@@ -230,7 +230,9 @@ TEST(UnitTestScenario, ImagingAndContrastArriveAndComeBackToTheBit)
     { "secondary_deg", 19.3 }, { "source_to_isocentre_mm", 712.3 },
     { "source_to_detector_mm", 1043.7 }, { "isocentre_mm", { 0.1, 0.2, 0.3 } },
     { "field_of_view_mm", 171.1 }, { "columns", 321 }, { "energy_keV", 61.9 },
-    { "iodine_mg_mL", 300.3 }, { "frame_rate_hz", 7.5 }, { "cine_rate_hz", 30 } };
+    { "iodine_mg_mL", 300.3 }, { "frame_rate_hz", 7.5 }, { "cine_rate_hz", 30 },
+    { "exposure_control", false }, { "heart_shadow_moves", false },
+    { "breathing", { { "rate_per_min", 11.3 }, { "amplitude_mm", 8.7 } } } };
   text["contrast"] = { { "viscosity_mPa_s", 3.3 }, { "systolic_pressure_mmHg", 141.7 },
     { "diastolic_pressure_mmHg", 77.7 }, { "left_axial_speed_cm_s", 17.3 },
     { "right_axial_speed_cm_s", 13.1 }, { "left_diastolic_ratio", 1.9 },
@@ -255,6 +257,10 @@ TEST(UnitTestScenario, ImagingAndContrastArriveAndComeBackToTheBit)
   EXPECT_EQ(imaging.iodine, 300.3);
   EXPECT_EQ(imaging.frameRate, 7.5);
   EXPECT_EQ(imaging.cineRate, 30.0);
+  EXPECT_FALSE(imaging.exposureControl);
+  EXPECT_FALSE(imaging.heartShadowMoves);
+  EXPECT_EQ(imaging.breathing.rate, 11.3);
+  EXPECT_EQ(imaging.breathing.amplitude, 8.7);
   EXPECT_EQ(s.contrast.flow.viscosity, 3.3);
   EXPECT_EQ(s.contrast.flow.systolicPressure, 141.7);
   EXPECT_EQ(s.contrast.flow.diastolicPressure, 77.7);
@@ -301,10 +307,42 @@ TEST(UnitTestScenario, RefusesWrongImagingAndContrast)
   Refused([](json& s) { s["imaging"]["background"] = 7; }, "'background'");
   Refused([](json& s) { s["imaging"]["background_run"] = "model"; }, "no 'background'");
   Refused([](json& s) { s["imaging"] = json::array(); }, "'imaging'");
+  Refused([](json& s) { s["imaging"]["exposure_control"] = 1; }, "'exposure_control'");
+  Refused([](json& s) { s["imaging"]["heart_shadow_moves"] = "yes"; }, "'heart_shadow_moves'");
+  Refused([](json& s) { s["imaging"]["breathing"]["rate_per_min"] = -1; },
+    "imaging, breathing has a negative 'rate_per_min'");
+  Refused([](json& s) { s["imaging"]["breathing"]["amplitude_mm"] = 41; }, "'amplitude_mm'");
+  Refused([](json& s) { s["imaging"]["breathing"]["depth"] = 3; }, "'depth', which means nothing");
+  Refused([](json& s) { s["imaging"]["breathing"] = 15; }, "'breathing'");
   Refused([](json& s) { s["contrast"]["colour"] = "red"; }, "contrast has 'colour'");
   Refused([](json& s) { s["contrast"]["tracers"] = 5; }, "'tracers'");
   Refused([](json& s) { s["contrast"]["viscosity_mPa_s"] = -3; }, "'viscosity_mPa_s'");
   Refused([](json& s) { s["contrast"]["diastolic_pressure_mmHg"] = 200; }, "contrast: ");
+}
+
+TEST(UnitTestScenario, RecordingsOfBeforeHaveNeitherControlNorMotionOfTheBackground)
+{
+  json text = json::parse(ScenarioText(LoadScenario("phantom-lca")));
+  EXPECT_TRUE(coronary::RecordedScenario(text.dump(), "'r'").imaging.exposureControl);
+  EXPECT_EQ(ScenarioText(coronary::RecordedScenario(text.dump(), "'r'")),
+    ScenarioText(LoadScenario("phantom-lca")));
+  for (const char* key : { "exposure_control", "heart_shadow_moves", "breathing" })
+  {
+    text["imaging"].erase(key);
+  }
+  const Scenario old = coronary::RecordedScenario(text.dump(), "'r'");
+  EXPECT_FALSE(old.imaging.exposureControl);
+  EXPECT_FALSE(old.imaging.heartShadowMoves);
+  EXPECT_EQ(old.imaging.breathing.rate, 0.0);
+  EXPECT_EQ(old.imaging.breathing.amplitude, 0.0);
+  const Scenario file = ScenarioFromText(text.dump(), "'file'", ".");
+  EXPECT_TRUE(file.imaging.exposureControl);
+  EXPECT_TRUE(file.imaging.heartShadowMoves);
+  EXPECT_GT(file.imaging.breathing.rate, 0.0);
+  EXPECT_TRUE(coronary::SamePatient(old.imaging, file.imaging));
+  Scenario other = file;
+  other.imaging.energy = 70.0;
+  EXPECT_FALSE(coronary::SamePatient(other.imaging, file.imaging));
 }
 
 TEST(UnitTestScenario, RefusesWithThePlace)
@@ -416,6 +454,7 @@ TEST(UnitTestScenario, ScriptsAreEvenPieces)
   refused(R"([ { "seconds": 1 }, { "seconds": 1, "wire": 3 } ])", "piece 2 has 'wire'");
   refused(R"([ { "seconds": 1, "heart_rate_bpm": 900 } ])", "'heart_rate_bpm'");
   refused(R"([ { "seconds": 1, "exchange_wire": -1 } ])", "'exchange_wire'");
+  refused(R"([ { "seconds": 1, "breaths_per_min": 61 } ])", "'breaths_per_min'");
   refused(R"([ { "wire_mm": 1 } ])", "has no 'seconds'");
   refused("3", "is no list");
 }

@@ -1,5 +1,7 @@
 // A session as a whole: what is counted of the trainee, that it repeats, and what its X-ray images show.
+#include "Attenuation.h"
 #include "Electrocardiogram.h"
+#include "ExposureControl.h"
 #include "HeartShell.h"
 #include "PhantomAnatomy.h"
 #include "SessionImager.h"
@@ -28,6 +30,7 @@ Scenario TestScenario()
 {
   Scenario scenario = LoadScenario("phantom-lca");
   scenario.imaging.columns = 256;
+  scenario.imaging.breathing.rate = 0.0; // what is seen is where it is
   return scenario;
 }
 
@@ -51,14 +54,19 @@ Scenario Aimed()
 }
 
 /// Water around the vessels, 200 mm thick along y.
-std::shared_ptr<const VolumeProjector> Water(const Scenario& scenario)
+HounsfieldVolume WaterVolume(const Scenario& scenario)
 {
   HounsfieldVolume volume;
   volume.grid.extent = { 0, 39, 0, 19, 0, 39 };
   volume.grid.spacing = Vector3(10.0, 10.0, 10.0);
   volume.grid.origin = scenario.imaging.pose.isocentre - Vector3(195.0, 95.0, 195.0);
   volume.values.assign(40 * 20 * 40, 0);
-  return MakeProjector(volume, scenario.imaging);
+  return volume;
+}
+
+std::shared_ptr<const VolumeProjector> Water(const Scenario& scenario)
+{
+  return MakeProjector(WaterVolume(scenario), scenario.imaging);
 }
 
 float At(const LineIntegrals& image, const Vector3& pixel)
@@ -230,6 +238,110 @@ TEST(TrainingSession, TheCArmStaysWithinItsReach)
   EXPECT_FALSE(session.Apply({ 200, 1.0 }));
   EXPECT_TRUE(session.Apply({ RecordedEvent::FieldOfView, 150.0 }));
   EXPECT_EQ(session.FieldOfView(), 150.0);
+}
+
+TEST(TrainingSession, DosesAsThePatientsThicknessNeeds)
+{
+  const Scenario scenario = Aimed();
+  const ExposureControl control(
+    Water(scenario), Attenuation(scenario.imaging.energy).Of(XRayMaterial::Water));
+  TrainingSession session(Phantom(), scenario, Water(scenario));
+  TrainingSession same(Phantom(), scenario, Water(scenario));
+  TrainingSession uncontrolled(Phantom(), scenario);
+  Scenario off = scenario;
+  off.imaging.exposureControl = false;
+  TrainingSession switchedOff(Phantom(), off, Water(scenario));
+  SessionInput input = session.StartInput();
+  DetectorFormat format;
+  format.columns = format.rows = 256;
+  format.width = format.height = session.FieldOfView();
+  double kerma = 0.0;
+  SessionSnapshot moment;
+  for (const double primary : { 0.0, 20.0, 45.0 })
+  {
+    input.primary = primary * Degree;
+    input.pedals = FluoroscopyPedal;
+    for (int tick = 0; tick < 400; ++tick)
+    {
+      const bool exposed = session.Step(input).exposed;
+      for (TrainingSession* other : { &same, &uncontrolled, &switchedOff })
+      {
+        EXPECT_EQ(other->Step(input).exposed, exposed);
+      }
+      if (!exposed)
+      {
+        continue;
+      }
+      session.SnapshotOfImage(moment);
+      const ViewExposure view = control.Of(session.Pose(), format);
+      EXPECT_DOUBLE_EQ(moment.exposure.kerma, 0.029 * view.kerma);
+      EXPECT_DOUBLE_EQ(moment.exposure.photons, 2000.0 * view.photons);
+      kerma += moment.exposure.kerma;
+    }
+  }
+  EXPECT_NEAR(session.Metrics().airKerma, kerma, 1e-9);
+  // 200 mm of water become 283.
+  EXPECT_GT(moment.exposure.kerma, 4.0 * 0.029);
+  EXPECT_EQ(session.StateHash(), same.StateHash());
+  EXPECT_NE(session.StateHash(), uncontrolled.StateHash());
+  EXPECT_EQ(uncontrolled.StateHash(), switchedOff.StateHash());
+  EXPECT_NEAR(uncontrolled.Metrics().airKerma,
+    0.029 * static_cast<double>(uncontrolled.Metrics().frames), 1e-9);
+}
+
+TEST(SessionImager, BreathingMovesTheHeartWithAllThatIsInIt)
+{
+  Scenario scenario = Aimed();
+  scenario.imaging.heartShadowMoves = false;
+  scenario.imaging.breathing.rate = 15.0;
+  TrainingSession session(Phantom(), scenario);
+  const auto parts = MovingPartsOf(WaterVolume(scenario), Phantom()->Topology(), scenario.imaging);
+  ASSERT_TRUE(parts && parts->heart.projector);
+  SessionImager imager(Phantom()->Topology(), scenario, Water(scenario), false, parts);
+  SessionImager still(Phantom()->Topology(), scenario, Water(scenario), false);
+  scenario.imaging.heartShadowMoves = true;
+  SessionImager beating(Phantom()->Topology(), scenario, Water(scenario), false, parts);
+  SessionInput input = session.StartInput();
+  input.pedals = CinePedal;
+  input.drive.wirePosition = 15.0;
+  SessionSnapshot moment;
+  for (int tick = 0; tick < 4000; ++tick)
+  {
+    session.Step(input);
+  }
+  session.SnapshotOfImage(moment);
+  EXPECT_NEAR(moment.diaphragm, scenario.imaging.breathing.amplitude, 1e-6) << "half a breath";
+  const auto hash = [&](SessionImager& one) { return SessionImager::HashOf(one.Expose(moment)); };
+  const std::uint64_t inspired = hash(imager);
+  EXPECT_NE(inspired, hash(still)) << "the heart's shadow";
+  EXPECT_NE(inspired, hash(beating));
+  EXPECT_EQ(hash(beating), hash(beating)) << "lag aside, the same bits";
+  DetectorFormat format;
+  format.columns = format.rows = 256;
+  format.width = format.height = session.FieldOfView();
+  const CArmGeometry geometry(moment.pose, format);
+  const Vector3 tip = moment.wire[6];
+  EXPECT_GT(At(imager.Instruments(), geometry.Project(tip + HeartShift(moment.diaphragm))), 0.1F);
+
+  // At the end of expiration, and with a heart whose shadow stands still, not a bit is changed.
+  moment.diaphragm = 0.0;
+  scenario.imaging.heartShadowMoves = false;
+  SessionImager expired(Phantom()->Topology(), scenario, Water(scenario), false, parts);
+  SessionImager before(Phantom()->Topology(), scenario, Water(scenario), false);
+  EXPECT_EQ(hash(expired), hash(before));
+  EXPECT_GT(At(expired.Instruments(), geometry.Project(tip)), 0.1F);
+  EXPECT_TRUE(session.Apply({ RecordedEvent::Breaths, 0.0 }));
+  session.Step(input);
+  session.SnapshotOfImage(moment);
+  const double held = moment.diaphragm;
+  for (int tick = 0; tick < 1000; ++tick)
+  {
+    session.Step(input);
+  }
+  session.SnapshotOfImage(moment);
+  EXPECT_EQ(moment.diaphragm, held);
+  scenario.imaging.breathing.amplitude = 0.0;
+  EXPECT_FALSE(MovingPartsOf(WaterVolume(scenario), Phantom()->Topology(), scenario.imaging));
 }
 
 TEST(SessionImager, ShowsTheWireAndTheMediumWhereTheyAre)
