@@ -4,7 +4,9 @@
 #include "GuideFromArch.h"
 #include "Intervention.h"
 #include "OstialTree.h"
+#include "Recording.h"
 #include "Refusals.h"
+#include "SessionRunner.h"
 #include "WallMotions.h"
 #include "WallTestMeshes.h"
 
@@ -356,6 +358,39 @@ TEST(GuideFromArch, RepeatsBitForBit)
     one = drive.physics.StateHash();
   }
   EXPECT_EQ(hash[0], hash[1]);
+}
+
+// Recorded hands: an extra backup guide in the beating phantom, whose aorta is wide.
+TEST(GuideFromArch, TheRecordedOneRepeatsToTheBit)
+{
+  auto source = std::make_unique<ReplaySource>(
+    std::string(DYNAMICCORONARY_SOURCE_DIR) + "/Testing/Data/Driving/engage-lca.pcirec");
+  const ReplaySource* replay = source.get();
+  const Scenario scenario =
+    ScenarioFromText(source->Reader().Header().scenario, "The recording", ".");
+  const auto wall =
+    MakePhantomWallMotion(scenario.vessels.phantom, scenario.vessels.phantom.surfaceSpacing, 40);
+  const std::uint64_t hash = WallHash(*wall);
+  ASSERT_EQ(hash, source->Reader().Header().meshHash);
+  SessionRunner runner(wall, scenario, hash, std::move(source));
+  double spilled = 0.0;
+  double furthest = 0.0;
+  runner.afterTick = [&](const SessionReport& report)
+  {
+    furthest = std::min(furthest, report.tick.catheterTip);
+    spilled = runner.Session().Contrast().Balance().spilled;
+  };
+  while (runner.Run(1000))
+  {
+  }
+  EXPECT_EQ(replay->Reader().HowEnded(), RecordingReader::Ending::Complete);
+  EXPECT_GT(runner.Compared().compared, 15U);
+  EXPECT_EQ(runner.Compared().equal, runner.Compared().compared)
+    << "from tick " << runner.Compared().firstDifference;
+  EXPECT_LT(furthest, -40.0);
+  EXPECT_TRUE(runner.Session().Report().tick.seat.engaged);
+  EXPECT_LT(spilled, 2.0) << "mL of 4";
+  EXPECT_EQ(3U, runner.Session().Procedure().reached.size());
 }
 
 TEST(GuideFromArch, RefusesAnAortaThatIsNotThere)
