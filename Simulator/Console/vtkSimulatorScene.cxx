@@ -112,10 +112,9 @@ vtkSimulatorScene::vtkSimulatorScene(WallMotion& wall, const Scenario& scenario,
   {
     this->MakeHeart();
   }
-  if (wall.Topology().aorta)
-  {
-    this->MakeAorta(wall.Topology());
-  }
+  this->Vessels.axis = wall.Topology().axis;
+  this->Vessels.parent = wall.Topology().parent;
+  this->Vessels.aorta = wall.Topology().aorta;
   this->MakeInstruments(scenario);
   this->MakeTracers();
   this->MakeWall(wall, settings.triangles);
@@ -249,12 +248,11 @@ void vtkSimulatorScene::MakeHeart()
   look->SetSpecular(0.08);
 }
 
-void vtkSimulatorScene::MakeAorta(const WallTopology& topology)
+void vtkSimulatorScene::MakeAorta()
 {
-  this->Aorta = std::make_unique<AortaMotion>(topology);
+  this->Aorta = std::make_unique<AortaMotion>(this->Vessels);
   UsePoints(this->AortaMesh);
-  SetPoints(this->AortaMesh, topology.aorta->points);
-  SetTriangles(this->AortaMesh, topology.aorta->triangles);
+  SetTriangles(this->AortaMesh, this->Vessels.aorta->triangles);
   vtkNew<vtkPolyDataMapper> mapper;
   mapper->SetInputData(this->AortaMesh);
   Draw(this->Renderer_, this->AortaActor, mapper);
@@ -384,9 +382,13 @@ void vtkSimulatorScene::Update(const SessionSnapshot& snapshot)
     this->Heart->Positions(snapshot.report.phase, this->HeartPoints);
     SetPoints(this->HeartMesh, this->HeartPoints);
   }
-  this->AortaActor->SetVisibility(this->Aorta && snapshot.guideFromArch);
-  if (this->AortaActor->GetVisibility() != 0)
+  this->AortaActor->SetVisibility(snapshot.guideFromArch);
+  if (snapshot.guideFromArch)
   {
+    if (!this->Aorta)
+    {
+      this->MakeAorta();
+    }
     this->Aorta->Positions(snapshot.axis, this->AortaPoints);
     SetPoints(this->AortaMesh, this->AortaPoints);
   }

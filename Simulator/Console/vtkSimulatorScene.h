@@ -73,7 +73,7 @@ private:
   void AnchorNormals(WallMotion& wall, vtkPolyData* whole, const std::vector<Vector3>& rest);
   void TurnNormals(const std::vector<Vector3>& points, const std::vector<Vector3>& axis);
   void MakeHeart();
-  void MakeAorta(const WallTopology& topology);
+  void MakeAorta();
   void MakeInstruments(const Scenario& scenario);
   void MakeTracers();
   void SetStents(const std::vector<StentShape>& stents);
@@ -82,7 +82,8 @@ private:
   std::vector<std::int64_t> Drawn;
   std::vector<AxisNormal> Normals;
   std::vector<Vector3> HeartPoints;
-  std::unique_ptr<const AortaMotion> Aorta; ///< null: none is drawn
+  WallTopology Vessels;                     ///< axes and aorta alone
+  std::unique_ptr<const AortaMotion> Aorta; ///< null: no guide came through it yet
   std::vector<Vector3> AortaPoints;
 
   vtkNew<vtkRenderer> Renderer_;

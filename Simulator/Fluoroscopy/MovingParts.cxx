@@ -1,6 +1,8 @@
 #include "MovingParts.h"
 
+#include "CubicStep.h"
 #include "Require.h"
+#include "VoxelCell.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
@@ -31,13 +33,6 @@ constexpr double SolidEnough = 0.3;   ///< determinant of a motion that is belie
 constexpr double Ridge =
   0.02; ///< of the mean variance: flat lists of points say nothing across themselves
 
-/// 0 up to 0, 1 from 1 on.
-double Step(double u)
-{
-  const double t = std::clamp(u, 0.0, 1.0);
-  return t * t * (3.0 - 2.0 * t);
-}
-
 /// The volume along the axes of the world.
 struct Upright
 {
@@ -60,38 +55,15 @@ struct Upright
 std::int16_t ValueAt(const HounsfieldVolume& volume, const Vector3& index)
 {
   const std::array<int, 6>& extent = volume.grid.extent;
-  std::array<int, 3> size{};
-  std::array<int, 3> cell{};
-  Eigen::Vector3d rest;
   for (int a = 0; a < 3; ++a)
   {
-    size[a] = extent[2 * a + 1] - extent[2 * a] + 1;
-    const double at = index[a] - extent[2 * a];
-    if (at < -0.5 || at > size[a] - 0.5)
+    if (index[a] < extent[2 * a] - 0.5 || index[a] > extent[2 * a + 1] + 0.5)
     {
       return -1000;
     }
-    cell[a] = std::clamp(static_cast<int>(std::floor(at)), 0, std::max(0, size[a] - 2));
-    rest[a] = std::clamp(at - cell[a], 0.0, 1.0);
   }
-  const auto value = [&](int corner)
-  {
-    const auto along = [&](int a, int bit)
-    { return static_cast<std::size_t>(std::min(cell[a] + (corner >> bit & 1), size[a] - 1)); };
-    return static_cast<double>(
-      volume.values[(along(2, 2) * size[1] + along(1, 1)) * size[0] + along(0, 0)]);
-  };
-  double sum = 0.0;
-  for (int corner = 0; corner < 8; ++corner)
-  {
-    double weight = 1.0;
-    for (int a = 0; a < 3; ++a)
-    {
-      weight *= (corner >> a & 1) != 0 ? rest[a] : 1.0 - rest[a];
-    }
-    sum += weight > 0.0 ? weight * value(corner) : 0.0;
-  }
-  return static_cast<std::int16_t>(std::lround(sum));
+  return static_cast<std::int16_t>(
+    std::lround(VoxelCell<double>(index, extent).Interpolate(volume.values.data())));
 }
 
 Upright UprightOf(const HounsfieldVolume& volume, const ProgressCallback& progress)
@@ -198,7 +170,7 @@ ColumnMap SharesOf(const ColumnMap& ends, double spacing)
           ++all;
         }
       }
-      shares.At(i, j) = ends.At(i, j) < 0.0 ? 0.0 : Step(2.0 * with / all - 1.0);
+      shares.At(i, j) = ends.At(i, j) < 0.0 ? 0.0 : CubicStep(2.0 * with / all - 1.0);
     }
   }
   return shares;
@@ -207,7 +179,7 @@ ColumnMap SharesOf(const ColumnMap& ends, double spacing)
 double HeartShare(const HeartPlace& heart, const Vector3& place)
 {
   const double level = (heart.axes * (place - heart.centre)).cwiseQuotient(heart.radii).norm();
-  return 1.0 - Step((level - HeartWhole) / (HeartEnds - HeartWhole));
+  return 1.0 - CubicStep((level - HeartWhole) / (HeartEnds - HeartWhole));
 }
 
 /// Of the voxels that a weight is above 0 in. @param weigh  gets i, j, k
@@ -341,9 +313,9 @@ MovingParts FindMovingParts(const HounsfieldVolume& patient, const HeartPlace& h
     {
       const double share = shares.At(i, j);
       const double above = (k - ends.At(i, j)) * body.spacing;
-      return share > 0.0 && above < LungFades
-        ? share * (1.0 - Step(above / LungFades)) * (1.0 - HeartShare(heart, body.Place(i, j, k)))
-        : 0.0;
+      return share > 0.0 && above < LungFades ? share * (1.0 - CubicStep(above / LungFades)) *
+          (1.0 - HeartShare(heart, body.Place(i, j, k)))
+                                              : 0.0;
     },
     progress);
   return parts;

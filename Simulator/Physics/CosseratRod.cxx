@@ -171,6 +171,16 @@ void RodSettings::Validate() const
   RequirePositive(this->maximumMove, "maximumMove");
 }
 
+RodSettings InstrumentRod()
+{
+  RodSettings rod;
+  rod.mediumFollowsWalls = true;
+  rod.reach = 0.08; // a little less than `trust`: what comes nearer is seen in the next tick
+  rod.maximumMove = 1.0;
+  rod.trust = 0.1;
+  return rod;
+}
+
 CosseratRod::CosseratRod(std::int64_t capacity, const RodSettings& settings)
   : Settings(settings)
   , Capacity(capacity)

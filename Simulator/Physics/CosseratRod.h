@@ -97,6 +97,9 @@ struct RodSettings
   void Validate() const;
 };
 
+/// Of a wire or a guide catheter in vessels that beat: light, and carried along by blood.
+RodSettings InstrumentRod();
+
 /**
  * Segments are numbered along the rod; the third axis of a segment's frame points to the next one. New ones are
  * added at the end: the first keep their numbers, and with them what surfaces remember of them.

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <limits>
 #include <stdexcept>
 
 namespace coronary
@@ -58,22 +57,7 @@ std::vector<Vector3> WayOf(const WallTopology& vessels)
 GuideSettings StartingAbove(
   GuideSettings settings, const WallTopology& vessels, const Vector3& ostium)
 {
-  const std::vector<Vector3> way = WayOf(vessels);
-  double nearest = std::numeric_limits<double>::infinity();
-  double along = 0.0;
-  double place = 0.0;
-  for (std::size_t i = 1; i < way.size(); ++i)
-  {
-    const SegmentPlace candidate = NearestOnSegment(ostium, way[i - 1], way[i]);
-    const double length = (way[i] - way[i - 1]).norm();
-    if (candidate.squaredDistance < nearest)
-    {
-      nearest = candidate.squaredDistance;
-      place = along + candidate.fraction * length;
-    }
-    along += length;
-  }
-  settings.start = std::max(10.0, place - GuideFromArch::StartsAbove);
+  settings.start = std::max(10.0, PlaceAlong(WayOf(vessels), ostium) - GuideFromArch::StartsAbove);
   return settings;
 }
 }

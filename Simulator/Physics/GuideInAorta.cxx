@@ -29,16 +29,6 @@ double TorsionOf(const CatheterSection& section)
 {
   return section.torsionalStiffness;
 }
-
-RodSettings TubeSettings()
-{
-  RodSettings rod;
-  rod.mediumFollowsWalls = true;
-  rod.reach = 0.08; // a little less than `trust`: what comes nearer is seen in the next tick
-  rod.maximumMove = 1.0;
-  rod.trust = 0.1;
-  return rod;
-}
 }
 
 void GuideSettings::Validate() const
@@ -125,7 +115,7 @@ GuideInAorta::GuideInAorta(
   , Settings(settings)
   , Pieces(MakeGuidePieces(guide, settings))
   , Bare(this->Pieces.joints)
-  , Tube(static_cast<std::int64_t>(this->Pieces.segments.size()), TubeSettings())
+  , Tube(static_cast<std::int64_t>(this->Pieces.segments.size()), InstrumentRod())
 {
   if (way.size() < 2 || !(PolylineLength(way) >= settings.start) ||
     !((way[1] - way[0]).norm() > 0.0))

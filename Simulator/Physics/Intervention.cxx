@@ -45,16 +45,6 @@ double Hardening(double gap)
   return 1.0 + std::max(0.0, -gap - deepInside) / twiceAsHard;
 }
 
-CosseratRod NewRod(int capacity)
-{
-  RodSettings rod;
-  rod.mediumFollowsWalls = true;
-  rod.reach = 0.08; // a little less than `trust`: what comes nearer is seen in the next tick
-  rod.maximumMove = 1.0;
-  rod.trust = 0.1;
-  return CosseratRod(capacity, rod);
-}
-
 enum class Notice : int
 {
   NotFinite = 0,
@@ -372,10 +362,7 @@ void Intervention::Internals::Engage(
 {
   const WallTopology& topology = this->Motion->Topology();
   const int root = RootOf(topology, this->Settings.rootBranch);
-  for (int b = 0; b < root; ++b)
-  {
-    this->RootFirst += topology.axis[b].size();
-  }
+  this->RootFirst = static_cast<std::size_t>(FirstAxisPoint(topology, root));
   this->RootCount = topology.axis[root].size();
   this->Motion->AxisPositions(this->Phase, this->Axis);
   this->RootAxis.assign(this->Axis.begin() + static_cast<std::ptrdiff_t>(this->RootFirst),
@@ -494,12 +481,11 @@ void Intervention::Internals::BeginFrame()
   if (this->Sleeve)
   {
     this->OpenWall();
-    this->Motion->AxisPositions(next, this->Axis);
-    this->Opening->Deform(this->Axis, this->NextPoints);
   }
-  else
+  this->Motion->AxisPositions(next, this->Axis);
+  if (this->Sleeve)
   {
-    this->Motion->AxisPositions(next, this->Axis);
+    this->Opening->Deform(this->Axis, this->NextPoints);
   }
   std::copy_n(this->Axis.begin() + static_cast<std::ptrdiff_t>(this->RootFirst), this->RootCount,
     this->RootAxis.begin());
@@ -882,7 +868,7 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   data.MakeSegments();
   data.Motion->Positions(data.Phase, data.NextPoints);
   data.LastPoints = data.NextPoints;
-  data.Rod = std::make_unique<CosseratRod>(NewRod(settings.capacity));
+  data.Rod = std::make_unique<CosseratRod>(settings.capacity, InstrumentRod());
   data.Engage(data.NextPoints, data.Rod->SamplesPerSegment());
   data.Plugs = OcclusionPlugs(data.Motion->Topology(), data.Axis);
   data.InVessel.assign(settings.capacity * data.Rod->SamplesPerSegment(), 0);
@@ -1163,7 +1149,7 @@ bool Intervention::Exchange(const Guidewire& wire)
   data.DriveBehind(); // how stiff it is, for how it rests
   data.Behind.Rest(data.HandAngle, data.HandAngle);
   data.DriveBehind();
-  *data.Rod = NewRod(data.Settings.capacity);
+  *data.Rod = CosseratRod(data.Settings.capacity, InstrumentRod());
   data.PlaceOnPath();
   data.KeepSane();
   return true;

@@ -11,9 +11,9 @@ namespace coronary
 namespace
 {
 constexpr double FurthestOstium = 15.0; // mm from the aorta's wall: another one is a graft's
+}
 
-/// mm along a line of what is nearest to a point.
-double AlongAt(const std::vector<Vector3>& line, const Vector3& point)
+double PlaceAlong(const std::vector<Vector3>& line, const Vector3& point)
 {
   double nearest = std::numeric_limits<double>::infinity();
   double along = 0.0;
@@ -30,7 +30,6 @@ double AlongAt(const std::vector<Vector3>& line, const Vector3& point)
     along += length;
   }
   return found;
-}
 }
 
 AortaMotion::AortaMotion(const WallTopology& topology)
@@ -55,7 +54,7 @@ AortaMotion::AortaMotion(const WallTopology& topology)
     if (away < FurthestOstium)
     {
       this->Ostia.push_back({ first, axis.front(), {} });
-      highest = std::max(highest, AlongAt(aorta.axis, axis.front()));
+      highest = std::max(highest, PlaceAlong(aorta.axis, axis.front()));
     }
     first += static_cast<std::int64_t>(axis.size());
   }
@@ -65,7 +64,7 @@ AortaMotion::AortaMotion(const WallTopology& topology)
   }
   for (const Vector3& point : this->Rest)
   {
-    const double above = AlongAt(aorta.axis, point) - highest - RootAbove;
+    const double above = PlaceAlong(aorta.axis, point) - highest - RootAbove;
     const double moves = 1.0 - CubicStep(above / FadesOver);
     double sum = 0.0;
     const auto weight = [&](const Ostium& ostium)

@@ -12,6 +12,9 @@
 
 namespace coronary
 {
+/// mm along a line of what is nearest to a point.
+double PlaceAlong(const std::vector<Vector3>& line, const Vector3& point);
+
 /**
  * A point moves as the ostia do, weighted by the square of its distance to each, from the valve to RootAbove mm along the axis
  * above the higher one, and less and less from there on over FadesOver mm. How much of it moves is chosen.

@@ -1,3 +1,4 @@
+#include "CubicStep.h"
 #include "VesselWallData.h"
 
 #include <utility>
@@ -9,8 +10,7 @@ namespace
 /// 0 below `from`, 1 above `to`, with level ends.
 double Ramp(double x, double from, double to)
 {
-  const double t = std::clamp((x - from) / (to - from), 0.0, 1.0);
-  return t * t * (3.0 - 2.0 * t);
+  return CubicStep((x - from) / (to - from));
 }
 }
 

@@ -293,25 +293,16 @@ std::map<int, int> BranchesByGroup(const PhantomTree& tree)
 AortaAtRest PhantomAorta(const CoronaryPhantom& phantom)
 {
   constexpr double time = 0.0;
-  constexpr double ValveBelow = 14.0; // mm, where its sections begin
   std::vector<AorticRing> rings = phantom.Aorta(time);
-  double length = 0.0;
-  std::size_t count = 0;
+  rings.resize(std::min(rings.size(), PhantomAortaSeen));
   for (AorticRing& ring : rings)
   {
     ring.centre = phantom.ReferencePosition(ring.centre, time);
-    length += count > 0 ? (ring.centre - rings[count - 1].centre).norm() : 0.0;
-    if (length > ValveBelow + PhantomAortaSeen)
-    {
-      break;
-    }
-    ++count;
     for (Vector3& point : ring.rim)
     {
       point = phantom.ReferencePosition(point, time);
     }
   }
-  rings.resize(count);
   AorticModel model = ModelAorta(rings);
   return { std::move(model.points), std::move(model.triangles), std::move(model.axis) };
 }

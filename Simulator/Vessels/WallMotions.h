@@ -98,8 +98,8 @@ private:
  */
 std::shared_ptr<WallMotion> SampleWallMotion(WallMotion& motion, int phases);
 
-/// The phantom's aorta at rest, completed from PhantomAortaSeen mm above the ostia on as a patient's is.
-constexpr double PhantomAortaSeen = 46.0;
+/// The phantom's aorta at rest, completed beyond its first PhantomAortaSeen sections (mm) as a patient's is.
+constexpr std::size_t PhantomAortaSeen = 60;
 AortaAtRest PhantomAorta(const CoronaryPhantom& phantom);
 
 /// Axes at rest with their radii, names and parents of the phantom's vessels; without a surface.
