@@ -23,6 +23,7 @@ constexpr double FilledConfidence = 0.3; ///< at most
 constexpr double ChanceConfidence = 0.4; ///< at most
 constexpr double LostDeviation = 2.0;    ///< mm
 constexpr double SearchedAgain = 0.5;    ///< mm
+constexpr double TissueRangeAnew = 3.0;  ///< mm
 /// What is seen alone among places that are not seen is seen by chance: mm around it.
 constexpr double SupportingReach = 8.0;
 constexpr double ChanceShare = 1.0 / 3.0;
@@ -317,17 +318,23 @@ PoseSequence LineTracker::Run()
   this->SearchCoarsely();
   if (this->Settings.tissue)
   {
-    this->Surroundings = this->SearchFinely(false, 0.6);
+    this->Surroundings = this->SearchFinely(false, this->Settings.fineRange, 0.6);
   }
   {
     // From where the first search ended: what bends deceives the surroundings more than the vessels.
-    const Seen vessels = this->SearchFinely(true, 0.7);
+    const Seen vessels = this->SearchFinely(true, this->Settings.fineRange, 0.68);
     this->Fit(this->WithSurroundings(vessels));
   }
-  for (int round = 0; round < 4; ++round)
+  this->Align(1.0, 0.76);
+  this->Align(1.0, 0.79);
+  if (this->Settings.tissue)
   {
-    this->Align(round < 2 ? 1.0 : 0.5, 0.8 + 0.04 * round);
+    // Anew: by now it is known how it turned and along what it was smeared.
+    this->Surroundings =
+      this->SearchFinely(false, std::min(TissueRangeAnew, this->Settings.fineRange), 0.82);
   }
+  this->Align(0.5, 0.9);
+  this->Align(0.5, 0.93);
   // A branch that was looked for in the wrong place may be seen where those around it say that it is.
   if (this->Settings.fillUnseen && this->FillLost() > SearchedAgain)
   {

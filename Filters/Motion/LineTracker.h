@@ -108,8 +108,8 @@ private:
   std::vector<std::string> OfPhases(
     const std::function<std::string(std::size_t phase)>& measure) const;
   /// Looks for the surroundings of the nodes without the vessels, which may be invisible, or with
-  /// them.
-  Seen SearchFinely(bool vessels, double progressFrom);
+  /// them, up to `range` mm from the present trajectories.
+  Seen SearchFinely(bool vessels, double range, double progressFrom);
   /// Per node: the patch's weights without what is nearer to a vessel's wall than `margin`, sum 1; all 0
   /// where too little is left.
   std::vector<std::vector<float>> WithoutVessels(const Patch& patch, double margin) const;

@@ -171,7 +171,7 @@ void LineTracker::Align(double robustScale, double progressFrom)
     std::vector<int> averaged(nodes, 1);
     const auto part = [&](double from, double to)
     {
-      const double share = 0.04 / static_cast<double>(phases);
+      const double share = 0.03 / static_cast<double>(phases);
       // NOLINTNEXTLINE(clang-analyzer-cplusplus.NewDeleteLeaks): std::function frees what it holds
       return this->Part(progressFrom + share * (static_cast<double>(k) + from),
         progressFrom + share * (static_cast<double>(k) + to));

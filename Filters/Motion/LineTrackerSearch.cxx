@@ -324,11 +324,11 @@ std::vector<std::vector<float>> LineTracker::WithoutVessels(const Patch& patch, 
   return weights;
 }
 
-LineTracker::Seen LineTracker::SearchFinely(bool vessels, double progressFrom)
+LineTracker::Seen LineTracker::SearchFinely(bool vessels, double range, double progressFrom)
 {
   const std::size_t phases = this->Times.size();
   const auto nodes = static_cast<std::int64_t>(this->Nodes.size());
-  const LabelLattice lattice{ static_cast<int>(std::ceil(this->Settings.fineRange)), 1.0 };
+  const LabelLattice lattice{ static_cast<int>(std::ceil(range)), 1.0 };
   const int blockReach = this->Fine.reach + lattice.reach;
   const int blockSide = 2 * blockReach + 1;
   const std::size_t samples = this->Fine.places.size();
@@ -341,7 +341,7 @@ LineTracker::Seen LineTracker::SearchFinely(bool vessels, double progressFrom)
     const std::vector<Vector3> places = this->PlacesAt(this->Displacement[k]);
     if (!std::all_of(places.begin(), places.end(),
           [&](const Vector3& place)
-          { return this->Volumes[k].Covers(place, this->Keep() - SpareReach); }))
+          { return this->Volumes[k].Covers(place, this->Settings.fineRadius + range); }))
     {
       this->Volumes[k] = SparseVolume(this->Read(this->Times[k]), places, this->Keep());
     }
@@ -412,8 +412,8 @@ LineTracker::Seen LineTracker::SearchFinely(bool vessels, double progressFrom)
           SumsOfSquares(block, blockSide, this->Fine, weights[n], wanted, lattice.reach, costs[n]);
         }
       },
-      this->Part(progressFrom + 0.1 * static_cast<double>(k) / static_cast<double>(phases),
-        progressFrom + 0.1 * static_cast<double>(k + 1) / static_cast<double>(phases)));
+      this->Part(progressFrom + 0.08 * static_cast<double>(k) / static_cast<double>(phases),
+        progressFrom + 0.08 * static_cast<double>(k + 1) / static_cast<double>(phases)));
     const double noise = SignalCurvature::NoiseOf(curvature, averaged);
     std::vector<float> minimum(nodes);
     for (std::int64_t n = 0; n < nodes; ++n)

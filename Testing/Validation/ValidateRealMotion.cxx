@@ -4,6 +4,7 @@
 #include "CenterlineTracking.h"
 #include "CounterRandom.h"
 #include "DistanceTransform.h"
+#include "LumenSight.h"
 #include "MotionRegularization.h"
 #include "PhaseInterpolation.h"
 #include "ScannedHeart.h"
@@ -283,7 +284,7 @@ class ScannerImages
 {
 public:
   ScannerImages(const MeshAnatomy& anatomy, const std::string& preset, double spacing,
-    const std::vector<double>& times)
+    double beatDeviation, const std::vector<double>& times)
     : Times(times)
   {
     const CoronaryPhantom::Box& heart = anatomy.Heart();
@@ -298,6 +299,7 @@ public:
     }
     ScannerSettings settings = ScannerPreset(preset);
     settings.heartShift = 0.0; // the truth has one place for a phase
+    settings.beatDeviation = beatDeviation;
     this->Scan = std::make_unique<CtScanner>(anatomy, settings, this->Grid, times);
     this->Scan->Scan(this->Store);
   }
@@ -419,9 +421,10 @@ struct Settings
   double window = 0.066;
   double captureRange = CenterlineTrackingSettings().captureRange;
   double fineRange = CenterlineTrackingSettings().fineRange;
-  std::string hidden;  ///< vessel; empty: none
-  std::string scanner; ///< preset; empty: images by a formula
-  double larger = 1.0; ///< factor of the motion
+  std::string hidden;         ///< vessel; empty: none
+  std::string scanner;        ///< preset; empty: images by a formula
+  double beatDeviation = 0.0; ///< of the scanner's R-R intervals, relative
+  double larger = 1.0;        ///< factor of the motion
   bool filling = true;
   bool asMeasured = false;
   bool quick = false;
@@ -556,6 +559,38 @@ void Print(const Judgement& one, const std::string& hidden)
   }
 }
 
+/// How far the lumens that the images show are from where they are, and from where they were tracked.
+void TellLumens(const Polylines& lines, const std::vector<std::vector<Vector3>>& truth,
+  const PoseSequence& poses, const std::function<ScalarImage(double time)>& imageAt)
+{
+  Errors fromTruth;
+  Errors fromTracked;
+  std::size_t places = 0;
+  for (std::size_t k = 0; k < poses.times.size(); ++k)
+  {
+    const ScalarImage image = imageAt(poses.times[k]);
+    const std::vector<double> ofTruth = SeeLumens(image, lines, truth[2 * k]).beside;
+    const std::vector<double> ofTracked = SeeLumens(image, lines, poses.points[k]).beside;
+    places += ofTruth.size();
+    for (std::size_t n = 0; n < ofTruth.size(); ++n)
+    {
+      if (std::max(ofTruth[n], ofTracked[n]) < NoLumenBeside)
+      {
+        fromTruth.values.push_back(ofTruth[n]);
+        fromTracked.values.push_back(ofTracked[n]);
+      }
+    }
+  }
+  if (!fromTruth.values.empty())
+  {
+    std::printf("%.3f of the places are beside a lumen that the images of tracked frames show: "
+                "%.3f mm from the truth, "
+                "%.3f mm from where they were tracked\n",
+      static_cast<double>(fromTruth.values.size()) / static_cast<double>(places), fromTruth.Mean(),
+      fromTracked.Mean());
+  }
+}
+
 bool Run(const Settings& options)
 {
   const Heart heart(options.data, options.asMeasured);
@@ -586,8 +621,8 @@ bool Run(const Settings& options)
     wanted.push_back(TimeOf(ReferenceFrame));
     std::sort(wanted.begin(), wanted.end());
     wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
-    const auto images =
-      std::make_shared<ScannerImages>(*anatomy, options.scanner, options.spacing, wanted);
+    const auto images = std::make_shared<ScannerImages>(
+      *anatomy, options.scanner, options.spacing, options.beatDeviation, wanted);
     imageAt = [images](double time) { return images->ImageAt(time); };
   }
   else
@@ -644,6 +679,10 @@ bool Run(const Settings& options)
     tracked.called / static_cast<double>(tracked.carried[0].values.size()),
     static_cast<double>(tracked.nearAxis) / std::max(tracked.called, 1),
     static_cast<double>(tracked.near) / std::max(tracked.called, 1), report.imagesRead);
+  if (!options.scanner.empty())
+  {
+    TellLumens(lines, truth, poses, imageAt);
+  }
   std::printf("Within limits, as `run` goes on with it:\n");
   Print(limited, options.hidden);
   const int judged = options.asMeasured ? 0 : 1; // frames that scatter cannot be interpolated
@@ -688,6 +727,12 @@ int main(int argc, char** argv)
         "images by a formula")
       ->check(CLI::IsMember(ScannerPresets()))
       ->excludes("--hide");
+    program
+      .add_option("--beat-deviation", options.beatDeviation,
+        "Of the scanner's R-R intervals, relative; it goes by their mean, and images then "
+        "show other moments than the truth")
+      ->check(CLI::Range(0.0, 0.1))
+      ->capture_default_str();
     program.add_option("--larger", options.larger, "Factor of the motion")
       ->check(CLI::Range(0.1, 3.0))
       ->capture_default_str();
