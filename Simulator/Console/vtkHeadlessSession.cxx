@@ -464,6 +464,7 @@ Scenario ScenarioOf(const HeadlessOptions& options)
   if (options.heartRate >= 0.0)
   {
     scenario.settings.heartRate = options.heartRate;
+    scenario.heartRateOfVessels = false;
   }
   return scenario;
 }

@@ -641,6 +641,7 @@ Scenario ScenarioFromText(
   const auto part = [&](const char* name)
   { return fields.Has(name) ? fields.Object(name) : Json::object(); };
   scenario.settings = SettingsOf(part("settings"), origin + ", settings");
+  scenario.heartRateOfVessels = !part("settings").contains("heart_rate_bpm");
   scenario.imaging = ImagingOf(part("imaging"), origin + ", imaging", folder);
   scenario.contrast = ContrastOf(part("contrast"), origin + ", contrast");
   scenario.seed =
@@ -673,6 +674,10 @@ std::string ScenarioText(const Scenario& scenario)
     { "settings", SettingsToJson(scenario.settings) },
     { "imaging", ImagingToJson(scenario.imaging) },
     { "contrast", ContrastToJson(scenario.contrast) }, { "seed", scenario.seed } };
+  if (scenario.heartRateOfVessels)
+  {
+    json["settings"].erase("heart_rate_bpm");
+  }
   for (const Guidewire& wire : scenario.wireExchanges)
   {
     json["wire_exchanges"].push_back(WireToJson(wire));

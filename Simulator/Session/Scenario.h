@@ -87,6 +87,8 @@ struct Scenario
   std::vector<VesselLesion> lesions;      ///< set into the vessels
   std::vector<ProcedureStep> procedure;   ///< what a trainee is to do; none: to drive about
   InterventionSettings settings;
+  bool heartRateOfVessels =
+    false; ///< none was given: that of the vessels' motion, where it is known
   ImagingSettings imaging;
   ContrastSettings contrast;
   std::uint64_t seed = 1; ///< of what is random in a session; the phantom has its own

@@ -6,6 +6,7 @@
 #include "VesselLesions.h"
 #include "VesselModel.h"
 
+#include <algorithm>
 #include <exception>
 #include <optional>
 
@@ -61,6 +62,11 @@ SessionWorld LoadWorld(const Scenario& scenario, bool background, const WorldPro
   world.wall = scenario.lesions.empty()
     ? model.wall
     : std::make_shared<NarrowedWallMotion>(model.wall, scenario.lesions);
+  if (scenario.heartRateOfVessels && model.heartRate > 0.0)
+  {
+    world.scenario.settings.heartRate = std::min(model.heartRate, 240.0);
+  }
+  world.scenario.heartRateOfVessels = false; // known now
   world.motion = model.motion;
   world.notes = model.notes;
   world.heart = model.heart;

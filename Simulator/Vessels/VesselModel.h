@@ -25,6 +25,7 @@ struct VesselModel
   std::vector<std::string> notes; ///< what was assumed, a sentence each
   std::string
     foreignMotion; ///< what of the motion is not the patient's, for the window; empty: nothing
+  double heartRate = 0.0; ///< of the motion, beats a minute; 0: not known
   std::shared_ptr<const PatientHeart>
     heart; ///< of a run with named vessels, where they lie at rest; else null
 };

@@ -419,6 +419,11 @@ std::shared_ptr<WallMotion> TrackedWall(
   const PoseSequence poses = PosesOf(list, skeleton, messages);
   model.motion = "tracked at " + std::to_string(poses.times.size()) + " moments";
   const auto posed = ReadPolyData(ReadFileSeries(list).front().path, messages);
+  vtkDataArray* cycle = posed->GetFieldData()->GetArray(names::CycleLength);
+  if (cycle && cycle->GetNumberOfValues() > 0 && cycle->GetTuple1(0) > 0.0)
+  {
+    model.heartRate = 60.0 / cycle->GetTuple1(0);
+  }
   auto* source =
     vtkStringArray::SafeDownCast(posed->GetFieldData()->GetAbstractArray(names::MotionSource));
   if (source && source->GetNumberOfValues() > 0)

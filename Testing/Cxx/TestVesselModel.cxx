@@ -104,6 +104,7 @@ TEST_F(TestVesselModel, MovesWithItsSkeleton)
   const VesselModel model = this->Load();
   const coronary::WallTopology& topology = model.wall->Topology();
   EXPECT_EQ(model.motion, "tracked at 5 moments");
+  EXPECT_NEAR(model.heartRate, 62.5, 1e-9) << "of a cycle of 0.96 s";
   EXPECT_TRUE(model.notes.empty());
   EXPECT_EQ(model.heart, nullptr) << "nothing says where a bar's heart is";
   ASSERT_EQ(topology.axis.size(), 1U);
@@ -157,6 +158,7 @@ TEST_F(TestVesselModel, StandsStillOrContractsWithoutMotion)
   fs::remove(this->Folder / "weights.vtu");
   const VesselModel still = this->Load();
   EXPECT_EQ(still.motion, "still");
+  EXPECT_EQ(still.heartRate, 0.0);
   ASSERT_EQ(still.notes.size(), 1U);
   EXPECT_NE(still.notes[0].find("stand still"), std::string::npos);
   std::vector<Vector3> a;

@@ -222,6 +222,17 @@ TEST(UnitTestScenario, EverySettingArrives)
   EXPECT_EQ(s.seed, 77U);
 }
 
+TEST(UnitTestScenario, ARateThatIsNotGivenIsThatOfTheVessels)
+{
+  json text = json::parse(ScenarioText(LoadScenario("phantom-lca")));
+  EXPECT_FALSE(ScenarioFromText(text.dump(), "'own.json'", ".").heartRateOfVessels);
+  text["settings"].erase("heart_rate_bpm");
+  const Scenario open = ScenarioFromText(text.dump(), "'own.json'", ".");
+  EXPECT_TRUE(open.heartRateOfVessels);
+  EXPECT_FALSE(json::parse(ScenarioText(open))["settings"].contains("heart_rate_bpm"));
+  EXPECT_TRUE(LoadScenario("patient-lca").heartRateOfVessels);
+}
+
 TEST(UnitTestScenario, ImagingAndContrastArriveAndComeBackToTheBit)
 {
   json text = json::parse(ScenarioText(LoadScenario("phantom-lca")));

@@ -87,6 +87,10 @@ inline void SaveChainRun(const std::filesystem::path& folder, int bones)
     {
       pose->GetPoints()->SetPoint(j, ChainJoint(j, time).data());
     }
+    vtkNew<vtkDoubleArray> cycle;
+    cycle->SetName("CycleLength");
+    cycle->InsertNextValue(0.96);
+    pose->GetFieldData()->AddArray(cycle);
     const std::string name = "skeleton_0" + std::to_string(k) + ".vtp";
     Save(vtkNew<vtkXMLPolyDataWriter>(), pose, folder / "motion" / name);
     files.push_back({ name, time });
