@@ -150,16 +150,24 @@ double VesselIncidents::Narrowing() const
 
 void VesselIncidents::Apply(std::vector<double>& lumen, std::vector<double>& filled) const
 {
+  const std::vector<int>& parents = this->Network.Topology().parent;
   for (const Spasm& spasm : this->Spasms)
   {
+    const auto has = [&](int b)
+    { return std::find(spasm.branches.begin(), spasm.branches.end(), b) != spasm.branches.end(); };
     for (const int b : spasm.branches)
     {
       const FlowBranch& branch = this->Network.Branches()[b];
+      // A segment may be several branches, one behind the other.
+      const bool begins = !has(parents[b]);
+      const bool ends = std::none_of(
+        spasm.branches.begin(), spasm.branches.end(), [&](int c) { return parents[c] == b; });
       const double end = branch.abscissa.back();
       const double taper = std::min(EndLength, 0.5 * end);
       for (std::size_t k = 0; k < branch.abscissa.size() && spasm.level > 0.0; ++k)
       {
-        const double within = std::min(branch.abscissa[k], end - branch.abscissa[k]);
+        const double within =
+          std::min(begins ? branch.abscissa[k] : taper, ends ? end - branch.abscissa[k] : taper);
         lumen[static_cast<std::size_t>(branch.firstPoint) + k] *=
           1.0 - spasm.narrowing * spasm.level * HalfCosine(within / taper);
       }
