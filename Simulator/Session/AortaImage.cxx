@@ -12,7 +12,7 @@ namespace coronary
 {
 namespace
 {
-constexpr double Faintest = 3e-4;   // of neat medium: a grey value or so across the aorta
+constexpr double Faintest = 1.5e-4; // of neat medium: a grey value or so across the aorta
 constexpr double FaintSinus = 1e-4; // mL
 // How it looks, chosen.
 constexpr double SinusPart = 0.8; // sigma of each part of a sinus, of a ball's of its whole volume
@@ -143,23 +143,24 @@ void AortaImage::Add(const std::vector<Vector3>& axis, const std::vector<double>
   }
   if (any)
   {
-    // Two pieces a slice.
+    // From the first to the last slice that shows: time goes with the pixels.
+    const auto shows = [](double medium) { return medium > Faintest; };
+    const auto first = std::find_if(mixed.begin(), mixed.end(), shows);
+    const auto last = std::find_if(mixed.rbegin(), mixed.rend(), shows).base();
+    const auto from = first - mixed.begin();
+    const auto to = last - mixed.begin();
+    this->Branch.concentrations.assign(first, std::max(first, last));
     this->Branch.points.clear();
     this->Branch.radii.clear();
-    this->Branch.concentrations.clear();
-    const auto at = [&](std::size_t slice) { return std::clamp(mixed[slice], 0.0, 1.0); };
-    for (std::size_t i = 0; i < mixed.size(); ++i)
+    for (auto k = from; k <= to && !this->Branch.concentrations.empty(); ++k)
     {
-      this->Branch.points.push_back(this->Points[i]);
-      this->Branch.points.emplace_back(0.5 * (this->Points[i] + this->Points[i + 1]));
-      this->Branch.radii.push_back(this->Sections.radii[i]);
-      this->Branch.radii.push_back(0.5 * (this->Sections.radii[i] + this->Sections.radii[i + 1]));
-      this->Branch.concentrations.push_back(0.75 * at(i) + 0.25 * at(i > 0 ? i - 1 : i));
-      this->Branch.concentrations.push_back(
-        0.75 * at(i) + 0.25 * at(i + 1 < mixed.size() ? i + 1 : i));
+      this->Branch.points.push_back(this->Points[static_cast<std::size_t>(k)]);
+      this->Branch.radii.push_back(this->Sections.radii[static_cast<std::size_t>(k)]);
     }
-    this->Branch.points.push_back(this->Points.back());
-    this->Branch.radii.push_back(this->Sections.radii.back());
+    for (double& medium : this->Branch.concentrations)
+    {
+      medium = std::clamp(medium, 0.0, 1.0);
+    }
     AddContrast({ this->Branch }, attenuation, geometry, image);
   }
   if (!this->Clouds.empty())

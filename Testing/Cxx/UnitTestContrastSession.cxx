@@ -178,7 +178,6 @@ TEST(ContrastSession, TheAortasShadowHasItsMedium)
   some[3] = 0.2;
   LineIntegrals image(256, 256);
   aorta->Add(axis, some, { 0.0, 0.0 }, neat, geometry, image);
-  // A fourth of it is drawn in its neighbours' nearer halves.
   const double exact = expected(0.2 * sections.Volume(3), sections.points[3]);
   Row("shadow of a slice of the aorta: sum over the image", exact, Sum(image), "5 %");
   EXPECT_NEAR(Sum(image) / exact, 1.0, 0.05);
@@ -277,7 +276,8 @@ TEST(ContrastSession, TheRecordedOneRepeatsToTheBit)
     MakePhantomWallMotion(scenario.vessels.phantom, scenario.vessels.phantom.surfaceSpacing, 40);
   const std::uint64_t hash = WallHash(*wall);
   ASSERT_EQ(hash, source->Reader().Header().meshHash);
-  SessionRunner runner(wall, scenario, hash, std::move(source));
+  SessionRunner runner(
+    wall, scenario, hash, std::move(source), MeasuredThorax(scenario, wall->Topology()));
   while (runner.Run(1000))
   {
   }
