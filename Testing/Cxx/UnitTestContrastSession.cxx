@@ -271,9 +271,10 @@ TEST(ContrastSession, TheRecordedOneRepeatsToTheBit)
     std::string(DYNAMICCORONARY_SOURCE_DIR) + "/Testing/Data/Driving/lca-events.pcirec";
   auto source = std::make_unique<ReplaySource>(file);
   const ReplaySource* replay = source.get();
-  const Scenario scenario = RecordedScenario(source->Reader().Header().scenario, "The recording");
+  Scenario scenario = RecordedScenario(source->Reader().Header().scenario, "The recording");
   const auto wall =
     MakePhantomWallMotion(scenario.vessels.phantom, scenario.vessels.phantom.surfaceSpacing, 40);
+  scenario.imaging.pose = StartPose(wall->Topology(), scenario.imaging);
   const std::uint64_t hash = WallHash(*wall);
   ASSERT_EQ(hash, source->Reader().Header().meshHash);
   SessionRunner runner(

@@ -216,6 +216,7 @@ TEST(DampedPressure, ASessionShowsTheAorticOneUntilTheGuideIsTight)
     1.0, wide.Now().tipPressure / aortic, "1 %");
 
   GuideSession tight(0.0, 1.25);
+  tight.Move(0.5, 0.0); // as the other one
   tight.Engage();
   ASSERT_TRUE(tight.Seat().engaged) << tight.Seat().depth << ", " << tight.Seat().offset << ", "
                                     << tight.input.drive.catheterPosition;
