@@ -28,11 +28,12 @@ GROUPS = [
     Group("Scenario: contraction", "Member `vessels.motion` with the model `contraction`; also `twist_deg` (-28 to 28, "
           "default 5.7), `base_mm` and `apex_mm`.", SCENARIO, ["NumbersOf(ContractionSettings& s)"],
           [("Simulator/Vessels/ContractionMotion.h", "ContractionSettings")]),
-    Group("Scenario: contrast", "Member `contrast` of a scenario.", SCENARIO,
+    Group("Scenario: contrast", "Member `contrast` of a scenario; also `guide_lumen` (true, false).", SCENARIO,
           ["NumbersOf(ContrastSettings& s)", "ContrastSettings ContrastOf("],
           [("Simulator/Contrast/ContrastModel.h", "ContrastSettings"),
            ("Simulator/Contrast/CoronaryFlow.h", "CoronaryFlowSettings"),
-           ("Simulator/Contrast/ContrastTracers.h", "ContrastTracerSettings")]),
+           ("Simulator/Contrast/ContrastTracers.h", "ContrastTracerSettings"),
+           ("Simulator/Contrast/AorticContrast.h", "AorticFlowSettings")]),
     Group("Scenario: breathing", "Member `imaging.breathing` of a scenario.", SCENARIO,
           ["NumbersOf(BreathingSettings& s)"], [("Simulator/Fluoroscopy/Breathing.h", "BreathingSettings")]),
     Group("Scenario: imaging", "Numbers of the member `imaging` of a scenario; also `exposure_control` and "

@@ -191,7 +191,8 @@ public:
       "greatest_force_N,contacts,largest_penetration_mm,mean_penetration_mm,joint_gap_mm,"
       "outside,branch\n";
     this->Flows = "tick,seconds,injection_mL_s,injected_mL,in_tree_mL,blush_mL,washed_out_mL,"
-                  "spilled_mL,aortic_pressure_mmHg,air_kerma_mGy,dose_area_Gy_cm2\n";
+                  "spilled_mL,aortic_pressure_mmHg,air_kerma_mGy,dose_area_Gy_cm2,in_guide_mL,"
+                  "in_aorta_mL,left_aorta_mL\n";
     this->Balloons =
       "tick,seconds,tip_mm,pressure_atm,least_mm,greatest_mm,hand_force_N,grip_N,wall_atm,"
       "lesion_least_mm,lesion_percent,pd_pa,flow_mL_s\n";
@@ -224,12 +225,13 @@ public:
       report.contacts, report.maximumPenetration, report.meanPenetration, report.jointGap,
       report.outside, VesselOf(topology, report.branch).c_str());
     this->Forces += text;
-    const ContrastBalance medium = session.Contrast().Balance();
-    std::snprintf(text, sizeof(text), "%llu,%.9g,%.6g,%.9g,%.9g,%.9g,%.9g,%.9g,%.6g,%.6g,%.6g\n",
+    const ContrastBalance medium = session.Balance();
+    std::snprintf(text, sizeof(text),
+      "%llu,%.9g,%.6g,%.9g,%.9g,%.9g,%.9g,%.9g,%.6g,%.6g,%.6g,%.9g,%.9g,%.9g\n",
       static_cast<unsigned long long>(this->Tick), seconds, session.Report().injection,
       medium.injected, medium.inTree, medium.blush, medium.washedOut, medium.spilled,
       session.Contrast().AorticPressure(), session.Metrics().airKerma,
-      session.Metrics().doseAreaProduct);
+      session.Metrics().doseAreaProduct, medium.inGuide, medium.inAorta, medium.leftAorta);
     this->Flows += text;
     this->Seconds.push_back(seconds);
     const double values[] = { report.tipForce, report.proximalForce, report.balloon.pressure,
@@ -786,6 +788,10 @@ Json NameOfEvent(std::uint8_t kind)
       return "wire_number";
     case RecordedEvent::Breaths:
       return "breaths_per_min";
+    case RecordedEvent::Flush:
+      return "flush_mL";
+    case RecordedEvent::Incident:
+      return "event_number";
     default:
       return static_cast<int>(kind);
   }

@@ -30,6 +30,7 @@ void ContrastSettings::Validate() const
 {
   this->flow.Validate();
   this->tracers.Validate();
+  this->aorta.Validate();
   RequireContrast(Within(this->smoothing, 0.0, 20.0), "smoothing", this->smoothing, "0 to 20 mm");
   RequireContrast(
     Within(this->flowDepression, 0.0, 1.0), "flowDepression", this->flowDepression, "0 to 1");
@@ -40,6 +41,7 @@ ContrastModel::ContrastModel(
   : Settings_(Checked(settings))
   , Flow_(topology, settings.flow)
   , Tracers_(this->Flow_.Network(), settings.tracers, seed)
+  , Aorta_(SectionsOfAorta(topology), settings.aorta)
 {
   this->MakeSlabs();
   this->MakeSmoothing();
@@ -127,13 +129,15 @@ double ContrastModel::SlabVolume(std::size_t slab) const
   return std::max(this->Slabs_[slab].volume, MinimumVolume);
 }
 
-void ContrastModel::Step(
-  double dt, double phase, double heartRate, double injection, const CatheterTip& tip)
+void ContrastModel::Step(double dt, double phase, double heartRate, double injection,
+  const CatheterTip& tip, double medium, double beside)
 {
   RequireContrast(Within(dt, 0.0005, 0.02), "time step", dt, "0.0005 to 0.02 s");
   RequireContrast(std::isfinite(phase), "phase", phase, "finite");
   RequireContrast(Within(heartRate, 0.0, 300.0), "heart rate", heartRate, "0 to 300 per minute");
   RequireContrast(Within(injection, 0.0, 50.0), "injection", injection, "0 to 50 mL/s");
+  RequireContrast(Within(medium, 0.0, 1.0), "fraction of medium", medium, "0 to 1");
+  RequireContrast(Within(beside, 0.0, 50.0), "medium beside the ostium", beside, "0 to 50 mL/s");
   if (injection > 0.0 && tip.branch != -1)
   {
     this->Flow_.Network().Locate(tip);
@@ -143,17 +147,46 @@ void ContrastModel::Step(
   flow.flow = &this->Flow_.Flow();
   flow.injector = this->Flow_.Injector();
   flow.injection = injection;
+  flow.medium = medium;
   if (flow.injector.segment >= 0)
   {
     flow.flowAbove = this->Flow_.FlowAtBeginning(flow.injector.segment);
   }
+  const double before = this->Tracers_.Spilled();
   this->Tracers_.Step(dt, flow);
+  this->Beside += dt * beside;
+  // What is injected in the aorta counts as spilled, too.
+  const double spilled = this->Tracers_.Spilled() - before;
+  const bool inAorta = tip.branch == -1;
+  this->StepAorta(dt,
+    EjectedFlow(this->Settings_.aorta, this->Settings_.flow.ejectionBegin,
+      this->Settings_.flow.systoleEnd, phase, heartRate),
+    inAorta ? 0.0 : spilled, dt * beside + (inAorta ? spilled : 0.0), tip);
   this->UpdateBlush();
   if (this->Settings_.flowDepression > 0.0)
   {
     this->DepressFlow(dt);
   }
   this->Current = false;
+}
+
+/// @param spilled  mL out of an ostium  @param beside  mL out of a tip that is in the aorta, or past the ostium
+void ContrastModel::StepAorta(
+  double dt, double flow, double spilled, double beside, const CatheterTip& tip)
+{
+  const FlowNetwork& network = this->Flow_.Network();
+  const int segment = this->Flow_.Injector().segment;
+  if (segment >= 0)
+  {
+    this->LastMouth =
+      static_cast<std::size_t>(network.Nodes()[network.Segments()[segment].above].tree);
+  }
+  AorticContrast::Inflow inflow;
+  inflow.mouth = this->LastMouth;
+  inflow.spilled = spilled;
+  inflow.direct = beside;
+  inflow.place = tip.branch == -1 ? tip.abscissa : this->Aorta_.Sections().mouths[this->LastMouth];
+  this->Aorta_.Step(dt, flow, inflow);
 }
 
 void ContrastModel::UpdateBlush()
@@ -334,14 +367,16 @@ double ContrastModel::Speed(int branch) const
 ContrastBalance ContrastModel::Balance() const
 {
   ContrastBalance balance;
-  balance.injected = this->Tracers_.Injected();
+  balance.injected = this->Tracers_.Injected() + this->Beside;
   balance.inTree = this->Tracers_.InTree();
   for (const double blush : this->Tracers_.Blush())
   {
     balance.blush += blush;
   }
   balance.washedOut = this->Tracers_.WashedOut();
-  balance.spilled = this->Tracers_.Spilled();
+  balance.spilled = this->Tracers_.Spilled() + this->Beside;
+  balance.inAorta = this->Aorta_.InAorta();
+  balance.leftAorta = this->Aorta_.Left();
   return balance;
 }
 

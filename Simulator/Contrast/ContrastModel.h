@@ -5,6 +5,7 @@
 #ifndef DynamicCoronary_ContrastModel_h
 #define DynamicCoronary_ContrastModel_h
 
+#include "AorticContrast.h"
 #include "ContrastTracers.h"
 #include "CoronaryFlow.h"
 #include "VesselFrames.h"
@@ -18,6 +19,7 @@ struct ContrastSettings
 {
   CoronaryFlowSettings flow;
   ContrastTracerSettings tracers;
+  AorticFlowSettings aorta;
 
   /// Length over which Concentration() is smoothed along a branch, mm, 0 (not at all) to 20. It hides the noise of
   /// the tracers' number.
@@ -26,6 +28,9 @@ struct ContrastSettings
   /// Strength of the fall of flow that contrast medium causes, 0 (off) to 1 (as published: flow falls to 45 % at
   /// 1.9 s after neat contrast medium reached the myocardium of dogs; Invest Radiol 1985).
   double flowDepression = 0.0;
+
+  /// Sessions: the guide catheter's lumen has a volume, which is to be filled; else medium leaves it at once.
+  bool guideLumen = false;
 
   /// @throws std::invalid_argument that names the first setting out of range or not finite
   void Validate() const;
@@ -40,15 +45,18 @@ struct ContrastSlab
   double volume = 0.0; ///< mL at rest
 };
 
-/// mL of contrast medium; injected = the sum of the others.
+/// mL of contrast medium; injected = inGuide + inTree + blush + washedOut + spilled.
 struct ContrastBalance
 {
   double injected = 0.0;
+  double inGuide = 0.0;   ///< in the guide catheter, or drawn back into the syringe
   double inTree = 0.0;    ///< in the arteries
   double blush = 0.0;     ///< in the myocardium
   double washedOut = 0.0; ///< left the myocardium
   double spilled =
-    0.0; ///< in the aorta: injected there, refluxed, or flowed back through an ostium
+    0.0; ///< into the aorta: injected there, refluxed, or flowed back through an ostium
+  double inAorta = 0.0;   ///< of that, in root and ascending aorta
+  double leftAorta = 0.0; ///< of that, beyond
 };
 
 /**
@@ -58,8 +66,7 @@ struct ContrastBalance
  * Injection: the medium enters undiluted (c0 = 1) at the tip and is at once mixed with the blood that passes it, over
  * the whole cross-section: below the tip c = Q_inj / (Q_inj + Q_blood), Q_blood what comes from above. When the tree
  * takes less than Q_inj, c = 1 below, and the excess flows upstream: into what branches off there, and out of the
- * ostium into the aorta, where it counts as spilled and does not come back. Branches above the tip get medium only
- * so.
+ * ostium into the aorta (AorticContrast), from where it does not come back. Branches above the tip get medium only so.
  */
 class ContrastModel
 {
@@ -75,10 +82,13 @@ public:
    * @param phase      fraction of R-R now, modulo 1
    * @param heartRate  1/min, 0 to 300; 0: the heart stands still
    * @param injection  mL/s, 0 to 50
-   * @param tip        where; branch -1: in the aorta, everything spills
+   * @param tip        where; branch -1: in the aorta, abscissa mm along its axis from the valve; everything spills
+   * @param medium     fraction of the injection that is contrast medium, 0 to 1
+   * @param beside     mL/s of contrast medium that leave the catheter and miss the ostium, 0 to 50
    * @throws std::invalid_argument naming the argument; nothing has changed then
    */
-  void Step(double dt, double phase, double heartRate, double injection, const CatheterTip& tip);
+  void Step(double dt, double phase, double heartRate, double injection, const CatheterTip& tip,
+    double medium = 1.0, double beside = 0.0);
 
   /// What Concentration() is of: branch by branch from its beginning on; axis points - 1 a branch.
   const std::vector<ContrastSlab>& Slabs() const { return this->Slabs_; }
@@ -110,8 +120,11 @@ public:
   double TreeFlow(int tree) const { return this->Flow_.TreeFlow(tree); }
   double AorticPressure() const { return this->Flow_.AorticPressureNow(); } ///< mmHg
 
-  ContrastBalance Balance() const;                                ///< exact to round-off
-  bool Empty() const { return this->Tracers_.Injected() == 0.0; } ///< nothing was ever injected
+  ContrastBalance Balance() const; ///< exact to round-off
+  bool Empty() const               ///< nothing was ever injected
+  {
+    return this->Tracers_.Injected() + this->Beside == 0.0;
+  }
   std::uint64_t StateHash() const; ///< over the bits of all that the next step depends on
 
   /// As CoronaryFlow::SetLumen; what tracers count as volume stays.
@@ -122,6 +135,8 @@ public:
 
   const CoronaryFlow& FlowModel() const { return this->Flow_; }
   const ContrastTracers& Tracers() const { return this->Tracers_; }
+  /// It follows from the rest's states, and is not in StateHash().
+  const AorticContrast& Aorta() const { return this->Aorta_; }
 
 private:
   /// A row of the equations that smooth, eliminated from a branch's beginning on.
@@ -135,6 +150,7 @@ private:
   void MakeSlabs();
   void MakeSmoothing();
   void DepressFlow(double dt);
+  void StepAorta(double dt, double flow, double spilled, double beside, const CatheterTip& tip);
   void UpdateBlush();
   /// The slab of a place along a branch, mL from its beginning.
   std::size_t SlabAt(int branch, double volume) const;
@@ -146,6 +162,9 @@ private:
   ContrastSettings Settings_;
   CoronaryFlow Flow_;
   ContrastTracers Tracers_;
+  AorticContrast Aorta_;
+  double Beside = 0.0;       ///< mL, so far
+  std::size_t LastMouth = 0; ///< tree of the last injection
   std::vector<ContrastSlab> Slabs_;
   std::vector<double> SlabLength;      ///< mm
   std::vector<double> SlabBegin;       ///< mL along the branch

@@ -551,9 +551,9 @@ void ContrastTracers::Step(double dt, const TracerFlow& flow)
   std::fill(this->Outflow_.begin(), this->Outflow_.end(), 0.0);
   this->WashOut(dt);
   this->Move();
-  if (flow.injection > 0.0)
+  if (flow.injection * flow.medium > 0.0)
   {
-    this->Inject(flow.injection * dt);
+    this->Inject(flow.injection * dt * flow.medium);
   }
   else if (this->TracerVolume > this->Settings_.volume && this->Size_ == 0)
   {

@@ -40,7 +40,8 @@ struct TracerFlow
   const std::vector<double>* flow = nullptr; ///< mL/s per segment, below the injector
   FlowNetwork::Place injector;               ///< segment -1: none
   double flowAbove = 0.0;                    ///< mL/s in the injector's segment above it
-  double injection = 0.0;                    ///< mL/s of contrast medium
+  double injection = 0.0;                    ///< mL/s
+  double medium = 1.0;                       ///< fraction of it that is contrast medium
 };
 
 /**

@@ -17,6 +17,7 @@ constexpr double LongestPiece = 36000.0; // s
 constexpr double MaximumHeartRate = 240.0;
 constexpr double MaximumBreaths = 60.0; // a minute
 constexpr std::int64_t MostExchanges = 100;
+constexpr double MostFlush = 50.0;    // mL
 constexpr double FurthestOfOld = 1e6; // mm, degrees, mL
 
 std::uint32_t PedalsOf(JsonFields& fields)
@@ -71,6 +72,10 @@ DrivePiece PieceOf(JsonFields& member, PiecesOf form)
   piece.wire = static_cast<double>(member.Whole("exchange_wire", 0, MostExchanges, 0));
   piece.setsBreaths = member.Has("breaths_per_min");
   piece.breaths = member.Number("breaths_per_min", 0.0, MaximumBreaths, 0.0);
+  piece.flushes = member.Has("flush_mL");
+  piece.flush = member.Number("flush_mL", -MostFlush, MostFlush, 0.0);
+  piece.callsIncident = member.Has("event");
+  piece.incident = static_cast<double>(member.Whole("event", 0, MostExchanges, 0));
   member.Done();
   return piece;
 }
@@ -171,6 +176,16 @@ std::vector<double> DriveScript::WireExchanges(double from, double to) const
 std::vector<double> DriveScript::BreathRates(double from, double to) const
 {
   return this->Chosen(from, to, &DrivePiece::setsBreaths, &DrivePiece::breaths);
+}
+
+std::vector<double> DriveScript::Flushes(double from, double to) const
+{
+  return this->Chosen(from, to, &DrivePiece::flushes, &DrivePiece::flush);
+}
+
+std::vector<double> DriveScript::Incidents(double from, double to) const
+{
+  return this->Chosen(from, to, &DrivePiece::callsIncident, &DrivePiece::incident);
 }
 
 DriveScript DriveScriptOf(JsonFields& fields, PiecesOf form)

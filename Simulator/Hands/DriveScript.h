@@ -30,6 +30,10 @@ struct DrivePiece
   double wire = 0.0;          ///< number of the wire that is taken
   bool setsBreaths = false;   ///< when the piece begins
   double breaths = 0.0;       ///< a minute; 0: the breath is held
+  bool flushes = false;       ///< when the piece begins
+  double flush = 0.0;         ///< mL of saline through the guide catheter; negative: drawn back
+  bool callsIncident = false; ///< when the piece begins
+  double incident = 0.0;      ///< number of the scenario's event; 0: nitrates
 };
 
 class DriveScript
@@ -53,6 +57,9 @@ public:
   std::vector<double> WireExchanges(double from, double to) const; ///< likewise of the wires
   /// Likewise breaths a minute.
   std::vector<double> BreathRates(double from, double to) const;
+  std::vector<double> Flushes(double from, double to) const; ///< likewise mL of saline
+  std::vector<double> Incidents(
+    double from, double to) const; ///< likewise numbers of events; 0: nitrates
 
 private:
   std::vector<double> Chosen(

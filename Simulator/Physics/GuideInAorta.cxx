@@ -19,7 +19,7 @@ constexpr double TubeDensity = 1200.0; // kg/m^3 of polymer and what fills it
 constexpr double TubeLossTime = 2e-3;  // s
 constexpr double TubeSpinDrag = 1e-6;  // N s
 constexpr int FewestSegments = 4;
-constexpr double MillimetresOfMercury = 133.322; // Pa
+constexpr double MillimetresOfMercury = 133.322387415; // Pa
 
 double BendingOf(const CatheterSection& section)
 {

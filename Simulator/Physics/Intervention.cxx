@@ -1042,17 +1042,19 @@ const GuideCatheter& Intervention::Catheter() const
 std::pair<std::int64_t, std::int64_t> Intervention::GuideCovers() const
 {
   const Internals& data = *this->Data;
+  std::int64_t first = 0;
   std::int64_t count = 0;
   if (data.Free && data.Report.seat.engaged)
   {
+    // What of the axis lies in the aorta is no vessel.
     double along = 0.0;
     for (std::size_t i = 0; i < data.RootCount && along <= data.Report.catheterTip; ++i)
     {
-      ++count;
+      (along < data.Free->MouthPlace() ? first : count) += 1;
       along += i + 1 < data.RootCount ? (data.RootAxis[i + 1] - data.RootAxis[i]).norm() : 0.0;
     }
   }
-  return { static_cast<std::int64_t>(data.RootFirst), count };
+  return { static_cast<std::int64_t>(data.RootFirst) + first, count };
 }
 
 const BalloonOnWire* Intervention::Balloon() const

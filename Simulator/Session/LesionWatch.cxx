@@ -38,7 +38,8 @@ const char* NameOf(ProcedureEvent::Kind kind, const char*& quantity)
     { "over_rated_pressure", "atm" }, { "stent_over_expansion", "diameter_over_greatest" },
     { "under_expansion", "area_over_reference" }, { "malapposition", "gap_mm" },
     { "geographic_miss", "disease_mm" }, { "beyond_vessel", "stent_mm" },
-    { "ischaemia", "share_without_blood" } };
+    { "ischaemia", "share_without_blood" }, { "vasospasm", "narrowing" },
+    { "air_embolism", "air_mL" } };
   const auto& [name, value] = names[static_cast<int>(kind)];
   quantity = value;
   return name;
@@ -96,14 +97,22 @@ int LesionWatch::BranchOf(std::int64_t point) const
     std::upper_bound(this->First.begin(), this->First.end(), point) - this->First.begin() - 1);
 }
 
-void LesionWatch::StepFlow(double seconds, const Intervention& instruments, ContrastModel& medium)
+void LesionWatch::StepFlow(double seconds, const Intervention& instruments,
+  const VesselIncidents& incidents, ContrastModel& medium)
 {
   this->FlowIsNew_ = false;
   const DilatableWall* wall = instruments.Dilated();
   const auto [guideFirst, guideCount] = instruments.GuideCovers();
-  if (wall || guideCount > 0 || !this->Filled_.empty())
+  if (wall || guideCount > 0 || incidents.Any() || !this->Filled_.empty())
   {
-    const std::vector<double>& lumen = wall ? wall->Radii() : this->Resting;
+    std::vector<double> narrowed;
+    if (incidents.Any())
+    {
+      narrowed = wall ? wall->Radii() : this->Resting;
+    }
+    const std::vector<double>& lumen = incidents.Any() ? narrowed
+      : wall                                           ? wall->Radii()
+                                                       : this->Resting;
     std::vector<double> filled(lumen.size(), 0.0);
     if (wall)
     {
@@ -115,6 +124,10 @@ void LesionWatch::StepFlow(double seconds, const Intervention& instruments, Cont
     for (std::int64_t point = guideFirst; point < guideFirst + guideCount; ++point)
     {
       filled[point] = std::max(filled[point], instruments.Catheter().outerRadius);
+    }
+    if (incidents.Any())
+    {
+      incidents.Apply(narrowed, filled);
     }
     if (filled != this->Filled_ || lumen != this->Lumen_)
     {
@@ -144,6 +157,13 @@ void LesionWatch::StepFlow(double seconds, const Intervention& instruments, Cont
     one.meanAortic += (first ? 1.0 : share) * (aortic - one.meanAortic);
     one.meanDistal += (first ? 1.0 : share) * (distal - one.meanDistal);
   }
+}
+
+void LesionWatch::Note(
+  const ProcedureEvent& event, const std::string& text, std::vector<std::string>& said)
+{
+  this->Events_.push_back(event);
+  said.push_back(text);
 }
 
 std::string LesionWatch::NameOfBranch(int branch) const

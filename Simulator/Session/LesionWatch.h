@@ -10,6 +10,7 @@
 #include "Intervention.h"
 #include "Ischaemia.h"
 #include "StentResult.h"
+#include "VesselIncidents.h"
 #include "VesselLesions.h"
 
 #include <string>
@@ -46,7 +47,9 @@ struct ProcedureEvent
     Malapposition,      ///< value: mm from stent to wall
     GeographicMiss,     ///< value: mm of the disease that are beside the stent
     BeyondVessel,       ///< value: mm of the stent without a vessel around
-    Ischaemia           ///< the ST segment is up; value: share of the heart without blood
+    Ischaemia,          ///< the ST segment is up; value: share of the heart without blood
+    Spasm,              ///< value: narrowing of the diameter
+    Air                 ///< in an artery; value: mL
   };
   Kind kind = Kind::OverExpansion;
   double seconds = 0.0;
@@ -64,12 +67,15 @@ public:
   explicit LesionWatch(const WallTopology& topology, const ContrastModel& medium);
 
   /// A step of the flow: the lumen as it is now, and what lies in it, goes into the network.
-  void StepFlow(double seconds, const Intervention& instruments, ContrastModel& medium);
+  void StepFlow(double seconds, const Intervention& instruments, const VesselIncidents& incidents,
+    ContrastModel& medium);
   /// Whether it is another flow since this was true before: the lumen has come to rest, or has changed for half a second.
   bool FlowIsNew() const { return this->FlowIsNew_; }
   /// @param place  mm from the ostium
   void TellIschaemia(
     const Ischaemia& heart, double seconds, double place, std::vector<std::string>& said);
+  /// @param text  a sentence, for people
+  void Note(const ProcedureEvent& event, const std::string& text, std::vector<std::string>& said);
   /// @param said  gets a sentence of each new event
   void StepTick(double seconds, const Intervention& instruments, const BalloonCatheter& balloon,
     std::vector<std::string>& said);
@@ -82,7 +88,7 @@ public:
   const std::vector<ProcedureEvent>& Events() const { return this->Events_; }
 
   ///@{
-  /// mm, per point of the axes in one list; empty without a balloon.
+  /// mm, per point of the axes in one list; empty without what changes or fills it.
   const std::vector<double>& Lumen() const { return this->Lumen_; }
   const std::vector<double>& Filled() const
   {

@@ -102,8 +102,8 @@ std::vector<NumberEntry> NumbersOf(ContrastSettings& s)
     { "outlet_exponent", &s.flow.outletExponent, 1.0, 4.0 },
     { "tracer_volume_mL", &s.tracers.volume, 1e-7, 0.1 },
     { "radial_diffusivity_mm2_s", &s.tracers.radialDiffusivity, 0.0, 100.0 },
-    { "smoothing_mm", &s.smoothing, 0.0, 20.0 },
-    { "flow_depression", &s.flowDepression, 0.0, 1.0 } };
+    { "smoothing_mm", &s.smoothing, 0.0, 20.0 }, { "flow_depression", &s.flowDepression, 0.0, 1.0 },
+    { "stroke_volume_mL", &s.aorta.strokeVolume, 5.0, 200.0 } };
 }
 
 std::vector<NumberEntry> NumbersOf(BreathingSettings& s)
@@ -427,6 +427,7 @@ ContrastSettings ContrastOf(const Json& object, const std::string& where)
   JsonFields fields(object, where);
   ReadNumbers(fields, NumbersOf(contrast));
   contrast.tracers.capacity = fields.Whole("tracers", 100, 10000000, contrast.tracers.capacity);
+  contrast.guideLumen = fields.Flag("guide_lumen", false);
   fields.Done();
   try
   {
@@ -444,6 +445,10 @@ Json ContrastToJson(const ContrastSettings& given)
   ContrastSettings contrast = given;
   Json json = WriteNumbers(NumbersOf(contrast));
   json["tracers"] = contrast.tracers.capacity;
+  if (contrast.guideLumen)
+  {
+    json["guide_lumen"] = true;
+  }
   return json;
 }
 
@@ -467,6 +472,62 @@ VesselLesion LesionOf(const Json& object, const std::string& where)
   lesion.strength = fields.Number("cap_MPa", 0.1, 100.0, lesion.strength);
   fields.Done();
   return lesion;
+}
+
+const char* const IncidentNames[] = { "spasm", "air" };
+const char* const WhenNames[] = { "called", "time", "injection", "inflation", "wire_in" };
+
+Incident IncidentOf(const Json& object, const std::string& where)
+{
+  Incident incident;
+  JsonFields fields(object, where);
+  incident.kind = static_cast<Incident::Kind>(OneOf(fields, "event", IncidentNames));
+  if (fields.Has("when"))
+  {
+    incident.when = static_cast<Incident::When>(OneOf(fields, "when", WhenNames));
+  }
+  if (incident.when == Incident::When::Time)
+  {
+    incident.at = fields.Number("at_s", 0.0, 36000.0);
+  }
+  const bool spasm = incident.kind == Incident::Kind::Spasm;
+  incident.vessel = spasm || incident.when == Incident::When::WireIn ? fields.Text("vessel")
+                                                                     : fields.Text("vessel", "");
+  if (spasm)
+  {
+    incident.narrowing = fields.Number("narrowing", 0.1, 0.98, incident.narrowing);
+    incident.onset = fields.Number("onset_s", 0.5, 60.0, incident.onset);
+  }
+  else
+  {
+    incident.volume = fields.Number("air_mL", 0.01, 5.0, incident.volume);
+  }
+  fields.Done();
+  return incident;
+}
+
+Json IncidentToJson(const Incident& incident)
+{
+  Json json = { { "event", IncidentNames[static_cast<int>(incident.kind)] },
+    { "when", WhenNames[static_cast<int>(incident.when)] } };
+  if (incident.when == Incident::When::Time)
+  {
+    json["at_s"] = incident.at;
+  }
+  if (!incident.vessel.empty())
+  {
+    json["vessel"] = incident.vessel;
+  }
+  if (incident.kind == Incident::Kind::Spasm)
+  {
+    json["narrowing"] = incident.narrowing;
+    json["onset_s"] = incident.onset;
+  }
+  else
+  {
+    json["air_mL"] = incident.volume;
+  }
+  return json;
 }
 
 ProcedureStep StepOf(const Json& object, const std::string& where)
@@ -625,6 +686,11 @@ Scenario ScenarioFromText(
     scenario.lesions.push_back(
       LesionOf(entry, origin + ", lesion " + std::to_string(scenario.lesions.size() + 1)));
   }
+  for (const Json& entry : fields.Has("events") ? fields.List("events") : none)
+  {
+    scenario.incidents.push_back(
+      IncidentOf(entry, origin + ", event " + std::to_string(scenario.incidents.size() + 1)));
+  }
   for (const Json& entry : fields.Has("procedure") ? fields.List("procedure") : none)
   {
     scenario.procedure.push_back(
@@ -699,6 +765,10 @@ std::string ScenarioText(const Scenario& scenario)
     {
       json["lesions"].back()["cap_MPa"] = lesion.strength;
     }
+  }
+  for (const Incident& incident : scenario.incidents)
+  {
+    json["events"].push_back(IncidentToJson(incident));
   }
   for (const ProcedureStep& step : scenario.procedure)
   {

@@ -11,6 +11,7 @@
 #include "ContrastModel.h"
 #include "Instrument.h"
 #include "Intervention.h"
+#include "VesselIncidents.h"
 #include "VesselLesions.h"
 #include "VesselSource.h"
 #include "WallMotion.h"
@@ -85,6 +86,7 @@ struct Scenario
   std::optional<BalloonCatheter> balloon; ///< none: the session has none
   std::vector<BalloonCatheter> exchanges; ///< for it, in their order; none without a balloon
   std::vector<VesselLesion> lesions;      ///< set into the vessels
+  std::vector<Incident> incidents;        ///< what goes wrong
   std::vector<ProcedureStep> procedure;   ///< what a trainee is to do; none: to drive about
   InterventionSettings settings;
   bool heartRateOfVessels =

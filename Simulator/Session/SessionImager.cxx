@@ -3,6 +3,7 @@
 #include "BackgroundVolume.h"
 #include "Fnv1a.h"
 #include "MaskResampling.h"
+#include "Numbers.h"
 #include "PhantomMotion.h"
 #include "RunImages.h"
 #include "VolumeFile.h"
@@ -268,6 +269,7 @@ SessionImager::SessionImager(const WallTopology& topology, const Scenario& scena
   , NeatContrast(this->Materials.OfContrastMedium(scenario.imaging.iodine))
   , AxisAtRest(PointsOfAxis(topology))
   , Images_({}, scenario.seed)
+  , Aorta(AortaImage::Make(topology))
 {
   BackgroundCacheSettings settings;
   settings.worker = worker;
@@ -370,7 +372,11 @@ void SessionImager::ProjectInstruments(
   const double wall = (1.0 - BraidShare) * this->Materials.Of(XRayMaterial::BariumPolymer) +
     BraidShare * this->Materials.Of(XRayMaterial::StainlessSteel);
   addCatheter({ guide.outerRadius, guide.innerRadius, wall });
-  if (snapshot.contrast.injected > 0.0)
+  if (!snapshot.guide.empty())
+  {
+    this->ProjectGuideLumen(snapshot, geometry);
+  }
+  else if (snapshot.contrast.injected > 0.0)
   {
     // Nobody flushes it: what was injected last stays in it.
     addCatheter({ guide.innerRadius, 0.0, this->NeatContrast });
@@ -380,6 +386,42 @@ void SessionImager::ProjectInstruments(
     this->ProjectBalloon(snapshot, geometry);
   }
   this->ProjectStents(snapshot, geometry);
+}
+
+/// Each piece of its line has the mean of what lies in it.
+void SessionImager::ProjectGuideLumen(const SessionSnapshot& snapshot, const CArmGeometry& geometry)
+{
+  const double radius = this->Scenario_.catheter.innerRadius;
+  InstrumentChain lumen{ snapshot.catheter, {} };
+  auto plug = snapshot.guide.begin();
+  double left = plug->volume; // mL of the plug that are further from the tip
+  double medium = 0.0;
+  for (std::size_t n = 0; n + 1 < snapshot.catheter.size(); ++n)
+  {
+    const double whole =
+      1e-3 * Pi * radius * radius * (snapshot.catheter[n + 1] - snapshot.catheter[n]).norm();
+    double missing = whole;
+    double inside = 0.0;
+    while (missing > 0.0 && plug != snapshot.guide.end())
+    {
+      const double part = std::min(missing, left);
+      inside += plug->medium * part;
+      missing -= part;
+      left -= part;
+      if (left <= 0.0)
+      {
+        ++plug;
+        left = plug != snapshot.guide.end() ? plug->volume : 0.0;
+      }
+    }
+    const double share = whole > 0.0 ? inside / whole : 0.0;
+    medium += share;
+    lumen.segments.push_back({ radius, 0.0, share * this->NeatContrast });
+  }
+  if (medium > 0.0)
+  {
+    AddInstrument(lumen, geometry, this->InstrumentLayer);
+  }
 }
 
 /// Shaft, markers, and what the balloon is filled with.
@@ -521,6 +563,11 @@ void SessionImager::ProjectContrast(const SessionSnapshot& snapshot, const CArmG
   if (!clouds.empty())
   {
     AddBlush(clouds, this->NeatContrast, geometry, this->ContrastLayer);
+  }
+  if (this->Aorta && !snapshot.aorta.empty())
+  {
+    this->Aorta->Add(snapshot.axis, snapshot.aorta, snapshot.sinuses, this->NeatContrast, geometry,
+      this->ContrastLayer);
   }
 }
 

@@ -5,6 +5,7 @@
 #ifndef DynamicCoronary_SessionImager_h
 #define DynamicCoronary_SessionImager_h
 
+#include "AortaImage.h"
 #include "Attenuation.h"
 #include "BackgroundCache.h"
 #include "ContrastProjector.h"
@@ -103,6 +104,7 @@ private:
   CArmGeometry GeometryOf(const CArmPose& pose, double fieldOfView) const;
   void ProjectInstruments(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   InstrumentChain WireOf(const SessionSnapshot& snapshot) const;
+  void ProjectGuideLumen(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   void ProjectBalloon(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   void ProjectStents(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   void ProjectContrast(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
@@ -131,6 +133,7 @@ private:
   LineIntegrals BackgroundLayer; ///< of this moment
   double Completeness = 0.0;
   std::vector<ContrastBranch> Branches;
+  std::unique_ptr<AortaImage> Aorta; ///< null: its medium is not drawn
 };
 }
 

@@ -31,6 +31,14 @@ std::vector<RecordedEvent> EventsOf(const DriveScript& script, double from, doub
   {
     events.push_back({ RecordedEvent::Breaths, rate });
   }
+  for (const double volume : script.Flushes(from, to))
+  {
+    events.push_back({ RecordedEvent::Flush, volume });
+  }
+  for (const double number : script.Incidents(from, to))
+  {
+    events.push_back({ RecordedEvent::Incident, number });
+  }
   return events;
 }
 

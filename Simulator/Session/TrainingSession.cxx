@@ -1,8 +1,10 @@
 #include "TrainingSession.h"
 
+#include "AortaMotion.h"
 #include "Attenuation.h"
 #include "ExposureControl.h"
 #include "Fnv1a.h"
+#include "GuideLumen.h"
 #include "HandAxes.h"
 #include "Numbers.h"
 
@@ -19,6 +21,8 @@ namespace
 {
 constexpr double ContrastStep = 0.005;    // s
 constexpr double GoalStep = 0.05;         // s
+constexpr double FlushSpeed = 3.0;        // mL/s
+constexpr double MostFlush = 50.0;        // mL
 constexpr double FastestInjection = 12.0; // mL/s: no hand and no injector of a laboratory does more
 constexpr double NearestDetector = 50.0;  // mm behind the isocentre
 constexpr double FurthestDetector = 1500.0; // mm from the source
@@ -76,6 +80,7 @@ struct TrainingSession::Internals
     , Physics(this->Wall, scenario.wire, scenario.catheter, this->Settings, scenario.balloon)
     , Medium(this->Wall->Topology(), scenario.contrast, scenario.seed)
     , Watch(this->Wall->Topology(), this->Medium)
+    , Incidents(this->Medium.FlowModel().Network())
     , Heart(this->Medium.FlowModel())
     , Clock(AcquisitionOf(scenario))
     , Breath(scenario.imaging.breathing)
@@ -85,7 +90,12 @@ struct TrainingSession::Internals
     , TicksOfProcedure(std::max<std::uint64_t>(
         1, static_cast<std::uint64_t>(std::lround(this->Settings.tickRate * GoalStep))))
     , Field(scenario.imaging.fieldOfView)
+    , GuideRadius(scenario.catheter.innerRadius)
   {
+    if (scenario.contrast.guideLumen)
+    {
+      this->Guide.emplace(scenario.catheter.innerRadius, scenario.catheter.length);
+    }
     this->Pose = scenario.imaging.pose;
     this->SetField();
     this->Artery = scenario.artery == "any" ? "artery" : scenario.artery;
@@ -93,6 +103,15 @@ struct TrainingSession::Internals
     {
       this->Control.emplace(
         std::move(patient), Attenuation(this->Imaging.energy).Of(XRayMaterial::Water));
+    }
+    this->Planned = scenario.incidents;
+    this->Happened.assign(this->Planned.size(), 0);
+    for (const Incident& incident : this->Planned)
+    {
+      if (!incident.vessel.empty())
+      {
+        this->Incidents.BranchesNamed(incident.vessel);
+      }
     }
     this->Steps = scenario.procedure;
     this->Procedure.emplace(this->Steps, this->Wall->Topology(),
@@ -114,18 +133,30 @@ struct TrainingSession::Internals
   DetectorFormat Format() const;
   void ControlExposure(const SessionInput& input);
   void StepContrast(const SessionInput& input);
+  double PushedMedium(const SessionInput& input, double seconds);
+  void StepGuide(double seconds, double pushed);
+  void StepIncidents(double seconds, double pushed);
+  void Happen(const Incident& incident);
+  void BlockWithAir(double volume, const std::string& vessel);
+  bool Call(double number);
+  bool Flush(double volume);
+  double EngagedShare() const;
+  double PlaceInAorta() const;
+  ContrastBalance Balance() const;
   void StepIschaemia(double seconds);
   void Measure(const SessionInput& input);
   void MeasureHands(const SessionInput& input);
   void StepProcedure();
   void TellOfGuide();
-  /// mmHg at the guide's tip.
+  /// mmHg at the guide's tip. Vessels whose blood is squeezed out collapse, which the network does not know: no less than the
+  /// atrium's.
   double TipPressure() const
   {
     const TickReport& tick = this->Report.tick;
-    return tick.seat.engaged
-      ? this->Medium.FlowModel().PressureAt({ this->Settings.rootBranch, tick.catheterTip })
-      : this->Medium.AorticPressure();
+    const CoronaryFlow& flow = this->Medium.FlowModel();
+    return tick.seat.engaged ? std::max(flow.Settings().venousPressure,
+                                 flow.PressureAt({ this->Settings.rootBranch, tick.catheterTip }))
+                             : this->Medium.AorticPressure();
   }
   template <typename Instrument>
   bool Exchange(
@@ -137,6 +168,13 @@ struct TrainingSession::Internals
   Intervention Physics;
   ContrastModel Medium;
   LesionWatch Watch;
+  VesselIncidents Incidents;
+  std::vector<Incident> Planned; // of the scenario
+  std::vector<char> Happened;    // of these
+  double InjectedAir = 0.0;      // mL in the aorta, so far
+  double AirAtHub = 0.0;         // mL that come in with the next step
+  std::string AirGoesTo;         // vessel of the last air; empty: where most blood flows
+  double Drawn = 0.0;            // mL of this step
   Ischaemia Heart;
   std::vector<ProcedureStep> Steps;
   std::optional<ProcedureWatch> Procedure;
@@ -160,6 +198,12 @@ struct TrainingSession::Internals
   std::uint64_t TicksOfContrast;
   std::uint64_t TicksOfProcedure;
   double Field;
+  double GuideRadius;              // mm, of its lumen
+  std::optional<GuideLumen> Guide; // none: it is as if it were without volume
+  bool GuideUsed = false;          // something was pushed or drawn
+  double Flushing = 0.0;  // mL of saline that are still to be pushed; negative: to be drawn back
+  double Pushed = 0.0;    // mL of contrast medium into the guide, so far
+  double DrawnBack = 0.0; // mL of it that came back
   CArmPose Pose;
   SessionReport Report;
   SessionMetrics Metrics;
@@ -220,9 +264,9 @@ void TrainingSession::Internals::SetView(const SessionInput& input)
   }
 }
 
-void TrainingSession::Internals::StepContrast(const SessionInput& input)
+/// mL that the syringe pushes in a step.
+double TrainingSession::Internals::PushedMedium(const SessionInput& input, double seconds)
 {
-  const double seconds = static_cast<double>(this->TicksOfContrast) / this->Settings.tickRate;
   const double plunger = std::isfinite(input.syringe) ? input.syringe : this->Plunger;
   // Drawing back stops the flow and fills the syringe: it goes on from there.
   this->Delivered = plunger < this->Plunger ? plunger : this->Delivered;
@@ -235,12 +279,239 @@ void TrainingSession::Internals::StepContrast(const SessionInput& input)
     this->Messages.emplace_back("The syringe is pushed faster than contrast medium can flow.");
   }
   this->FarTooFast = wanted > 2.0;
+  return pushed;
+}
+
+/// Of what leaves the tip: the part of its lumen's section that lies in the artery's.
+double TrainingSession::Internals::EngagedShare() const
+{
+  const TickReport& tick = this->Report.tick;
+  if (tick.catheterTip < 0.0)
+  {
+    return 0.0;
+  }
+  const double b =
+    this->Medium.FlowModel().Network().RadiusAt(this->Settings.rootBranch, tick.catheterTip);
+  const double a = std::min(this->GuideRadius, b);
+  const double d = tick.seat.engaged ? tick.seat.offset : 0.0;
+  if (d <= b - a)
+  {
+    return 1.0;
+  }
+  if (d >= a + b)
+  {
+    return 0.0;
+  }
+  // Two circles' lens.
+  const double x = (d * d + a * a - b * b) / (2.0 * d);
+  const double y = std::sqrt(std::max(0.0, a * a - x * x));
+  const double lens = a * a * std::acos(std::clamp(x / a, -1.0, 1.0)) +
+    b * b * std::acos(std::clamp((d - x) / b, -1.0, 1.0)) - d * y;
+  return lens / (Pi * a * a);
+}
+
+/// mm from the valve, of the guide's tip.
+double TrainingSession::Internals::PlaceInAorta() const
+{
+  const std::vector<Vector3>& sections = this->Medium.Aorta().Sections().points;
+  const std::vector<Vector3>& line = this->Physics.CatheterLine();
+  return sections.empty() || line.empty() ? 0.0 : PlaceAlong(sections, line.front());
+}
+
+/// @param pushed  mL of contrast medium
+void TrainingSession::Internals::StepGuide(double seconds, double pushed)
+{
+  // One hand: saline waits for the syringe.
+  const double flush =
+    pushed > 0.0 ? 0.0 : std::clamp(this->Flushing, -FlushSpeed * seconds, FlushSpeed * seconds);
+  this->Flushing -= flush;
+  this->Pushed += pushed;
+  this->GuideUsed = this->GuideUsed || pushed > 0.0 || flush != 0.0;
+  this->Drawn = std::max(0.0, -flush);
+  GuideLumen::Outflow out = this->Guide->Push({ std::exchange(this->AirAtHub, 0.0), 0.0, true });
+  const GuideLumen::Outflow syringe = this->Guide->Push({ pushed, 1.0, false });
+  const GuideLumen::Outflow saline = this->Guide->Push({ flush, 0.0, false });
+  this->DrawnBack += this->Guide->Draw(-flush).medium;
+  for (const GuideLumen::Outflow& more : { syringe, saline })
+  {
+    out.liquid += more.liquid;
+    out.medium += more.medium;
+    out.air += more.air;
+  }
+  if (out.air > 0.0)
+  {
+    this->BlockWithAir(out.air, this->AirGoesTo);
+  }
+  const double share = this->EngagedShare();
+  const double medium = out.liquid > 0.0 ? std::min(1.0, out.medium / out.liquid) : 1.0;
+  const double flow = out.liquid / seconds;
+  this->Report.injection = flow;
+  const bool inAorta = share == 0.0;
+  this->Medium.Step(seconds, this->Report.tick.phase, this->HeartRate,
+    inAorta ? flow : share * flow,
+    { inAorta ? -1 : this->Settings.rootBranch,
+      inAorta ? this->PlaceInAorta() : this->Report.tick.catheterTip },
+    medium, inAorta ? 0.0 : (1.0 - share) * flow * medium);
+}
+
+void TrainingSession::Internals::StepContrast(const SessionInput& input)
+{
+  const double seconds = static_cast<double>(this->TicksOfContrast) / this->Settings.tickRate;
+  const double pushed = this->PushedMedium(input, seconds);
+  this->StepIncidents(seconds, pushed);
+  this->Watch.StepFlow(seconds, this->Physics, this->Incidents, this->Medium);
+  this->StepIschaemia(seconds);
+  if (this->Guide)
+  {
+    this->StepGuide(seconds, pushed);
+    return;
+  }
   this->Report.injection = pushed / seconds;
   const double place = this->Report.tick.catheterTip;
-  this->Watch.StepFlow(seconds, this->Physics, this->Medium);
-  this->StepIschaemia(seconds);
   this->Medium.Step(seconds, this->Report.tick.phase, this->HeartRate, this->Report.injection,
-    { place >= 0.0 ? this->Settings.rootBranch : -1, std::max(0.0, place) });
+    { place >= 0.0 ? this->Settings.rootBranch : -1,
+      place >= 0.0     ? place
+        : pushed > 0.0 ? this->PlaceInAorta()
+                       : 0.0 });
+}
+
+void TrainingSession::Internals::StepIncidents(double seconds, double pushed)
+{
+  const TickReport& tick = this->Report.tick;
+  const auto isNow = [&](const Incident& incident)
+  {
+    const std::vector<std::string>& names = this->Wall->Topology().groupName;
+    switch (incident.when)
+    {
+      case Incident::When::Time:
+        return static_cast<double>(this->Tick) >= incident.at * this->Settings.tickRate;
+      case Incident::When::Injection:
+        return pushed > 0.0;
+      case Incident::When::Inflation:
+        return tick.balloon.wallPressure > 0.0;
+      case Incident::When::WireIn:
+        return tick.branch >= 0 && names[static_cast<std::size_t>(tick.branch)] == incident.vessel;
+      case Incident::When::Called:
+        break;
+    }
+    return false;
+  };
+  for (std::size_t n = 0; n < this->Planned.size(); ++n)
+  {
+    if (this->Happened[n] == 0 && isNow(this->Planned[n]))
+    {
+      this->Happened[n] = 1;
+      this->Happen(this->Planned[n]);
+    }
+  }
+  if (this->Incidents.Any())
+  {
+    const bool blocked = this->Incidents.Blocked();
+    this->Incidents.Step(seconds, tick.catheterTip >= 0.0 ? this->Drawn : 0.0);
+    if (blocked && !this->Incidents.Blocked())
+    {
+      this->Messages.emplace_back("The air in the arteries is gone.");
+    }
+  }
+}
+
+void TrainingSession::Internals::Happen(const Incident& incident)
+{
+  if (incident.kind == Incident::Kind::Spasm)
+  {
+    this->Incidents.BeginSpasm(incident.vessel, incident.narrowing, incident.onset);
+    char text[160];
+    std::snprintf(text, sizeof(text), "Vasospasm: the %s narrows by %.0f %%.",
+      incident.vessel.c_str(), 100.0 * incident.narrowing);
+    this->Watch.Note({ ProcedureEvent::Kind::Spasm, this->Metrics.procedureSeconds,
+                       this->Incidents.BranchesNamed(incident.vessel).front(), incident.narrowing },
+      text, this->Messages);
+    return;
+  }
+  this->AirGoesTo = incident.vessel;
+  if (!this->Guide)
+  {
+    this->BlockWithAir(incident.volume, incident.vessel);
+    return;
+  }
+  this->AirAtHub += incident.volume;
+  char text[120];
+  std::snprintf(
+    text, sizeof(text), "%.2g mL of air have come into the guide catheter's hub.", incident.volume);
+  this->Messages.emplace_back(text);
+}
+
+/// Out of the guide's tip.
+void TrainingSession::Internals::BlockWithAir(double volume, const std::string& vessel)
+{
+  if (this->Report.tick.catheterTip < 0.0)
+  {
+    if (this->InjectedAir == 0.0)
+    {
+      this->Messages.emplace_back("Air goes out of the guide catheter into the aorta.");
+    }
+    this->InjectedAir += volume;
+    return;
+  }
+  const bool before = this->Incidents.Blocked();
+  const int branch = this->Incidents.AddAir(
+    volume, vessel, this->Medium.FlowModel().Flow(), this->Settings.rootBranch);
+  if (!before)
+  {
+    const double all = volume + (this->Guide ? this->Guide->Air() : 0.0);
+    this->Watch.Note({ ProcedureEvent::Kind::Air, this->Metrics.procedureSeconds, branch, all },
+      "Air goes into the coronary artery: no blood passes it in the " +
+        this->Wall->Topology().groupName[static_cast<std::size_t>(branch)] + ".",
+      this->Messages);
+  }
+}
+
+/// @param number  of the scenario's event, from 1 on; 0: nitrates
+bool TrainingSession::Internals::Call(double number)
+{
+  if (number == 0.0)
+  {
+    this->Incidents.GiveNitrates();
+    this->Messages.emplace_back("Nitrates are given.");
+    return true;
+  }
+  if (!(number >= 1.0) || number > static_cast<double>(this->Planned.size()) ||
+    number != std::floor(number))
+  {
+    char text[120];
+    std::snprintf(text, sizeof(text), "There is no event number %g: the scenario has %zu.", number,
+      this->Planned.size());
+    this->Messages.emplace_back(text);
+    return false;
+  }
+  const auto n = static_cast<std::size_t>(number) - 1;
+  this->Happened[n] = 1;
+  this->Happen(this->Planned[n]);
+  return true;
+}
+
+/// @param volume  mL of saline; negative: drawn back
+bool TrainingSession::Internals::Flush(double volume)
+{
+  if (!this->Guide)
+  {
+    this->Messages.emplace_back(
+      "The guide catheter has no volume in this scenario: it cannot be flushed.");
+    return false;
+  }
+  this->Flushing = std::clamp(volume, -MostFlush, MostFlush);
+  return true;
+}
+
+ContrastBalance TrainingSession::Internals::Balance() const
+{
+  ContrastBalance balance = this->Medium.Balance();
+  if (this->Guide)
+  {
+    balance.inGuide = this->Guide->Medium() + this->DrawnBack;
+    balance.injected = this->Pushed;
+  }
+  return balance;
 }
 
 void TrainingSession::Internals::StepIschaemia(double seconds)
@@ -279,7 +550,7 @@ void TrainingSession::Internals::Measure(const SessionInput& input)
   metrics.frames = total.frames;
   metrics.airKerma = total.airKerma;
   metrics.doseAreaProduct = total.doseAreaProduct;
-  metrics.contrast = this->Medium.Balance().injected;
+  metrics.contrast = this->Guide ? this->Pushed : this->Medium.Tracers().Injected();
   metrics.maximumWallForce = std::max(metrics.maximumWallForce, tick.maximumForce);
   metrics.maximumTipForce = std::max(metrics.maximumTipForce, tick.tipForce);
   metrics.forcefulSeconds += tick.tipForce > ForcefulTip ? seconds : 0.0;
@@ -377,7 +648,7 @@ void TrainingSession::Internals::StepProcedure()
   const bool lesions = this->Procedure->NeedsLesions();
   this->Procedure->Step({ this->Report.tick, this->Metrics, this->Pose,
                           this->Clock.Radiating() && this->Clock.Last().cine, this->Clock.Runs(),
-                          this->Medium.Balance().injected, this->WireNumber },
+                          this->Medium.Tracers().Injected(), this->WireNumber },
     lesions ? this->Watch.Results(this->Physics, this->Medium) : std::vector<LesionResult>(),
     lesions ? this->Watch.Stents(this->Physics) : std::vector<StentResult>(), this->Messages);
 }
@@ -496,6 +767,10 @@ bool TrainingSession::Apply(const RecordedEvent& event)
       return data.Exchange(event.value, data.Balloons, data.BalloonNumber, "balloon");
     case RecordedEvent::ExchangeWire:
       return data.Exchange(event.value, data.Wires, data.WireNumber, "wire");
+    case RecordedEvent::Flush:
+      return data.Flush(event.value);
+    case RecordedEvent::Incident:
+      return data.Call(event.value);
     case RecordedEvent::Breaths:
       data.Breath.SetRate(std::clamp(event.value, 0.0, Breathing::FastestRate));
       return true;
@@ -522,6 +797,11 @@ const Intervention& TrainingSession::Instruments() const
 const ContrastModel& TrainingSession::Contrast() const
 {
   return this->Data->Medium;
+}
+
+ContrastBalance TrainingSession::Balance() const
+{
+  return this->Data->Balance();
 }
 
 std::vector<LesionResult> TrainingSession::Lesions() const
@@ -580,6 +860,10 @@ std::uint64_t TrainingSession::StateHash() const
   {
     add(data.Medium.StateHash());
   }
+  if (data.Guide && data.GuideUsed)
+  {
+    hash = data.Guide->Hash(hash);
+  }
   if (data.Metrics.frames > 0)
   {
     add(data.Clock.StateHash());
@@ -607,7 +891,15 @@ void TrainingSession::SnapshotOfImage(SessionSnapshot& snapshot) const
   snapshot.report = data.Report.tick;
   snapshot.metrics = data.Metrics;
   snapshot.procedure = data.Procedure->State();
-  snapshot.contrast = data.Medium.Balance();
+  snapshot.contrast = data.Balance();
+  const AorticContrast& aorta = data.Medium.Aorta();
+  snapshot.aorta = aorta.Empty() ? std::vector<double>() : aorta.Concentration();
+  snapshot.sinuses = aorta.Empty() ? std::vector<double>() : aorta.Sinuses();
+  snapshot.guide.clear();
+  if (data.Guide)
+  {
+    snapshot.guide.assign(data.Guide->Plugs().begin(), data.Guide->Plugs().end());
+  }
   snapshot.injection = data.Report.injection;
   snapshot.tipPressure = data.TipPressure();
   snapshot.input = data.Last;

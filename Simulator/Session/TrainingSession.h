@@ -10,6 +10,7 @@
 #include "Breathing.h"
 #include "CArm.h"
 #include "ContrastModel.h"
+#include "GuideLumen.h"
 #include "Intervention.h"
 #include "LesionWatch.h"
 #include "Procedure.h"
@@ -29,7 +30,7 @@ namespace coronary
 struct SessionReport
 {
   TickReport tick;
-  double injection = 0.0; ///< mL/s that leave the catheter
+  double injection = 0.0; ///< mL/s that leave the catheter, whatever it is
   bool exposed = false;   ///< a frame is exposed at this tick: Exposure()
 };
 
@@ -51,14 +52,17 @@ struct SessionSnapshot
   double frameRate = 0.0;   ///< Hz, of fluoroscopy
   double diaphragm = 0.0;   ///< mm below its place at the end of expiration
   bool radiating = false;
-  Exposure exposure;                 ///< the last one
-  std::size_t wireNumber = 0;        ///< as WireOf
-  std::vector<Vector3> wire;         ///< from its tip, mm
-  std::vector<Vector3> catheter;     ///< from its tip, mm
-  bool guideFromArch = false;        ///< it lies in the aorta, which is to be seen
-  std::vector<Vector3> axis;         ///< as WallMotion::AxisPositions
-  std::vector<double> concentration; ///< as ContrastModel::Concentration
-  std::vector<double> blush;         ///< per branch, mL
+  Exposure exposure;                   ///< the last one
+  std::size_t wireNumber = 0;          ///< as WireOf
+  std::vector<Vector3> wire;           ///< from its tip, mm
+  std::vector<Vector3> catheter;       ///< from its tip, mm
+  bool guideFromArch = false;          ///< it lies in the aorta, which is to be seen
+  std::vector<Vector3> axis;           ///< as WallMotion::AxisPositions
+  std::vector<double> concentration;   ///< as ContrastModel::Concentration
+  std::vector<double> blush;           ///< per branch, mL
+  std::vector<double> aorta;           ///< as AorticContrast::Concentration; empty: it has none
+  std::vector<double> sinuses;         ///< mL, as AorticContrast::Sinuses; likewise
+  std::vector<GuideLumen::Plug> guide; ///< in the guide catheter, from its tip; empty: not followed
   ///@{
   /// With a balloon, else empty.
   std::vector<double> lumen;        ///< mm, per point of the axis
@@ -113,6 +117,7 @@ public:
   const SessionMetrics& Metrics() const;
   const Intervention& Instruments() const;
   const ContrastModel& Contrast() const;
+  ContrastBalance Balance() const; ///< with what is in the guide catheter
   std::vector<LesionResult> Lesions() const;
   std::vector<StentResult> Stents() const; ///< that are in the wall
   const ProcedureState& Procedure() const;

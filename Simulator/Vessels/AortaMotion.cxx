@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 namespace coronary
 {
@@ -33,13 +34,18 @@ double PlaceAlong(const std::vector<Vector3>& line, const Vector3& point)
 }
 
 AortaMotion::AortaMotion(const WallTopology& topology)
+  : AortaMotion(topology, topology.aorta ? topology.aorta->points : std::vector<Vector3>())
+{
+}
+
+AortaMotion::AortaMotion(const WallTopology& topology, std::vector<Vector3> points)
+  : Rest(std::move(points))
 {
   if (!topology.aorta || topology.aorta->axis.size() < 2)
   {
     throw std::invalid_argument("there is no aorta");
   }
   const AortaAtRest& aorta = *topology.aorta;
-  this->Rest = aorta.points;
   double highest = 0.0;
   std::int64_t first = 0;
   for (std::size_t b = 0; b < topology.axis.size(); ++b)
@@ -47,7 +53,7 @@ AortaMotion::AortaMotion(const WallTopology& topology)
     const std::vector<Vector3>& axis = topology.axis[b];
     const bool root = b >= topology.parent.size() || topology.parent[b] < 0;
     double away = std::numeric_limits<double>::infinity();
-    for (const Vector3& point : this->Rest)
+    for (const Vector3& point : aorta.points)
     {
       away = root ? std::min(away, (point - axis.front()).norm()) : away;
     }

@@ -28,6 +28,8 @@ public:
   /// @param topology  its axes at rest, and its aorta
   /// @throws std::invalid_argument  there is no aorta, or it is not closed; no ostium is within 15 mm of it
   explicit AortaMotion(const WallTopology& topology);
+  /// Of other points than the wall's, mm, at rest.
+  AortaMotion(const WallTopology& topology, std::vector<Vector3> points);
 
   /// @param axis  as WallMotion::AxisPositions @param points  mm; resized
   void Positions(const std::vector<Vector3>& axis, std::vector<Vector3>& points) const;

@@ -212,6 +212,7 @@ void SessionWindow::ConnectPanels()
       this->Panel->SetInjection(speed);
     }
   };
+  this->Contrast->chosen = [this](const RecordedEvent& event) { this->Chosen(event); };
   this->Heart->chosen = [this](const RecordedEvent& event) { this->Chosen(event); };
   this->Instruments->chosen = [this](const RecordedEvent& event)
   {
@@ -319,6 +320,7 @@ void SessionWindow::ShowScenario()
 {
   this->Instruments->ShowScenario(
     this->World.scenario, this->World.wall->Topology().aorta != nullptr);
+  this->Contrast->ShowScenario(this->World.scenario);
   this->XRay->ShowScenario(this->World.scenario.imaging);
   this->Heart->ShowRate(this->World.scenario.settings.heartRate);
   this->Heart->ShowBreaths(this->World.scenario.imaging.breathing.rate);

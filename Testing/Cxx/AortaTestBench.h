@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <vector>
 
 namespace coronary
@@ -160,6 +161,45 @@ inline void AppendStump(WallTopology& topology, std::vector<Vector3>& points, co
     point = line[0] + turn * point;
   }
 }
+
+/// The bench's left coronary artery, with its aorta; the artery begins at the aorta's wall, or a little beyond.
+struct TriangleBench
+{
+  WallTopology vessels;
+  std::vector<Vector3> points;
+  Ostium ostium = AortaBench::Mouth(true);
+
+  /// @param spacing  mm, of the axis
+  explicit TriangleBench(double beyond = 0.0, double length = 60.0, double spacing = 1.0)
+  {
+    AppendTube(this->vessels, this->points, 0.0, AortaBench::Coronary, length, 24,
+      static_cast<int>(std::lround(length / spacing)));
+    const Eigen::Quaterniond turn =
+      Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), this->ostium.direction);
+    const Vector3 first = this->ostium.position + beyond * this->ostium.direction;
+    const auto place = [&](const Vector3& p) { return Vector3(first + turn * p); };
+    for (Vector3& point : this->points)
+    {
+      point = place(point);
+    }
+    for (Vector3& point : this->vessels.axis[0])
+    {
+      point = place(point);
+    }
+    this->vessels.points = static_cast<std::int64_t>(this->points.size());
+    this->vessels.group.assign(this->points.size(), 0);
+    this->vessels.groupName[0] = "LM";
+    WallTopology aorta;
+    std::vector<Vector3> wall;
+    AppendAorta(aorta, wall, 64, 2.0);
+    auto shape = std::make_shared<AortaAtRest>();
+    shape->points = wall;
+    shape->triangles = aorta.triangles;
+    const std::vector<Vector3> way = AortaBench::Way();
+    shape->axis.assign(way.rbegin(), way.rend());
+    this->vessels.aorta = shape;
+  }
+};
 
 /// The wire over which a guide is brought up: 0.035 inch, a steel core of 0.6 mm behind a soft end.
 inline Guidewire LeadingWire()

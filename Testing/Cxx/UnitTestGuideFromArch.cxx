@@ -22,44 +22,6 @@ using namespace coronary;
 
 namespace
 {
-/// The bench's left coronary artery, with its aorta; the artery begins at the aorta's wall, or a little beyond.
-struct TriangleBench
-{
-  WallTopology vessels;
-  std::vector<Vector3> points;
-  Ostium ostium = AortaBench::Mouth(true);
-
-  explicit TriangleBench(double beyond = 0.0, double length = 60.0)
-  {
-    AppendTube(this->vessels, this->points, 0.0, AortaBench::Coronary, length, 24,
-      static_cast<int>(std::lround(length)));
-    const Eigen::Quaterniond turn =
-      Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), this->ostium.direction);
-    const Vector3 first = this->ostium.position + beyond * this->ostium.direction;
-    const auto place = [&](const Vector3& p) { return Vector3(first + turn * p); };
-    for (Vector3& point : this->points)
-    {
-      point = place(point);
-    }
-    for (Vector3& point : this->vessels.axis[0])
-    {
-      point = place(point);
-    }
-    this->vessels.points = static_cast<std::int64_t>(this->points.size());
-    this->vessels.group.assign(this->points.size(), 0);
-    this->vessels.groupName[0] = "LM";
-    WallTopology aorta;
-    std::vector<Vector3> wall;
-    AppendAorta(aorta, wall, 64, 2.0);
-    auto shape = std::make_shared<AortaAtRest>();
-    shape->points = wall;
-    shape->triangles = aorta.triangles;
-    const std::vector<Vector3> way = AortaBench::Way();
-    shape->axis.assign(way.rbegin(), way.rend());
-    this->vessels.aorta = shape;
-  }
-};
-
 /// The wall and its axis go to and fro along a direction.
 class ShakenWall : public WallMotion
 {

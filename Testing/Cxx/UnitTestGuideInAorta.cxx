@@ -533,12 +533,13 @@ TEST(GuideInAorta, SeatIsMeasuredFromTheOstium)
 TEST(GuideInAorta, LeakBesideItsTip)
 {
   // Without a catheter: Poiseuille, 8 eta L / (pi b^4).
-  const double poiseuille = 8.0 * 3.5e-3 * 0.005 / (M_PI * std::pow(1.5e-3, 4)) * 1e-6 / 133.322;
+  const double poiseuille =
+    8.0 * 3.5e-3 * 0.005 / (M_PI * std::pow(1.5e-3, 4)) * 1e-6 / 133.322387415;
   EXPECT_NEAR(AnnularResistance(0.0, 1.5, 5.0) / poiseuille, 1.0, 1e-12);
   EXPECT_NEAR(AnnularResistance(1e-9, 1.5, 5.0) / poiseuille, 1.0, 0.1);
   // A narrow gap h is that between plates: 12 eta L / (2 pi a h^3).
   const double plates =
-    12.0 * 3.5e-3 * 0.005 / (2.0 * M_PI * 1e-3 * std::pow(1e-5, 3)) * 1e-6 / 133.322;
+    12.0 * 3.5e-3 * 0.005 / (2.0 * M_PI * 1e-3 * std::pow(1e-5, 3)) * 1e-6 / 133.322387415;
   EXPECT_NEAR(AnnularResistance(1.0 - 0.005, 1.0 + 0.005, 5.0) / plates, 1.0, 0.001);
   EXPECT_TRUE(std::isinf(AnnularResistance(1.0, 1.0, 5.0)));
   EXPECT_TRUE(std::isinf(AnnularResistance(1.1, 1.0, 5.0)));
