@@ -34,7 +34,8 @@
  *   (N), greatest contact force (N); every 40 ticks
  * - 3 event: kind (1 byte), double. Kind 1: heart rate, beats a minute; 2: frames a second of
  *   fluoroscopy; 3: field of view, mm; 4: number of the balloon that is taken, 0 the scenario's
- *   first; 5: that of the wire, likewise; 6: breaths a minute, 0: the breath is held
+ *   first; 5: that of the wire, likewise; 6: breaths a minute, 0: the breath is held; 7: which of
+ *   two wires the hand is on from now on, 0 or 1
  * - 4 state hash: 8 bytes, FNV-1a of the instruments' state, and of contrast medium and exposures
  *   once there have been any; every 1000 ticks and at the end
  * - 5 image hash: 8 bytes, FNV-1a of an X-ray image's size and pixels; written with `--xray`
@@ -107,7 +108,8 @@ struct RecordedEvent
     FieldOfView = 3,  ///< mm of the detector that are used, across
     Exchange = 4,     ///< number of the balloon that is taken, as BalloonOf
     ExchangeWire = 5, ///< number of the wire that is taken, as WireOf
-    Breaths = 6       ///< a minute; 0: the breath is held where it is
+    Breaths = 6,      ///< a minute; 0: the breath is held where it is
+    TakeWire = 7      ///< the hand goes to this wire: 0 the first, 1 the second
   };
   std::uint8_t kind = 0;
   double value = 0.0;

@@ -125,7 +125,7 @@ public:
   std::uint64_t UnknownEvents() const { return this->Unknown; }
 
 private:
-  static constexpr std::size_t EventKinds = RecordedEvent::Breaths + 1; // the last kind
+  static constexpr std::size_t EventKinds = RecordedEvent::TakeWire + 1; // the last kind
 
   bool Step();
   void TakePosted();
