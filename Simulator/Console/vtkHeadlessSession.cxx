@@ -256,7 +256,7 @@ public:
       this->Curves[n].values.push_back(values[n]);
     }
     this->AddBalloon(session, seconds);
-    const std::vector<Vector3>& line = intervention.Centerline();
+    const std::vector<Vector3>& line = intervention.Centerline(report.hand);
     if (line.size() > 1)
     {
       const Vector3 ahead = (line[0] - line[1]).normalized();

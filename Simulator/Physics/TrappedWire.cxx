@@ -10,7 +10,7 @@ namespace
 constexpr double MegapascalPerAtm = 0.101325;
 constexpr double Opened = 0.05;     // mm that a balloon is wider than folded, to be in the way
 constexpr double Deepest = 0.05;    // mm that an obstacle pushes with at most
-constexpr double LeavesAt = 0.3;    // mm beyond where it is held: it goes into a side branch there
+constexpr double LeavesAt = 0.1;    // mm beyond the wall: it goes into a side branch there
 constexpr double Softness = 0.02;   // mm, as RodSettings
 constexpr double Stiffness = 20.0;  // N/mm of a sample, of what is open
 constexpr double LeastForce = 1e-4; // N
@@ -157,13 +157,13 @@ TrappedWire::At TrappedWire::MeetChain(
   const double inside = mixed(&Station::insideNow, &Station::insideNext);
   const double wall = mixed(&Station::wallNow, &Station::wallNext);
   const bool room = wall - inside > 2.0 * sample.radius;
-  const double held = 0.5 * (inside + wall); // of its middle, where there is none
+  const double held = wall - sample.radius; // of its middle, where there is none
   const double least = room ? inside + sample.radius : held;
   const Vector3 axis = (at(b) - at(a)).normalized();
   Vector3 across = sample.centre - (1.0 - along) * at(a) - along * at(b);
   across -= across.dot(axis) * axis;
   const double distance = across.norm();
-  if (distance > held + sample.radius + LeavesAt)
+  if (distance > wall + LeavesAt)
   {
     return At::Free;
   }

@@ -16,8 +16,8 @@ namespace coronary
 {
 /**
  * What is open in the vessel is an obstacle from inside, about the vessel's axis. Where there is no room for the wire between that
- * and the wall, the wall yields around the wire: its middle lies half way between both, pressed from both sides with the wall's
- * pressure on its own width, p d a length. So Coulomb friction on both sides holds it with 2 mu p d a length.
+ * and the wall, both yield around the wire: it stays at the wall, pressed from both sides with the wall's pressure on its own
+ * width, p d a length. So Coulomb friction on both sides holds it with 2 mu p d a length.
  *
  * It is jailed by a stent that was left in the wall while it lay there, until it has been drawn out; what comes afterwards is in the
  * stent's lumen. Struts do not catch it.

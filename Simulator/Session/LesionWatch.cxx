@@ -361,7 +361,7 @@ void LesionWatch::StepJail(
           ? Format("The %s wire is jailed between the stent and the wall.", names[n])
           : Format("The %s wire is free of the stent.", names[n]));
     }
-    const bool hard = wire.jailed && wire.grip > StentBears;
+    const bool hard = n == report.hand && wire.jailed && wire.grip > StentBears;
     if (hard && !this->PulledHard[n])
     {
       this->Tell({ ProcedureEvent::Kind::JailedWirePulled, seconds, -1, wire.grip,

@@ -10,12 +10,12 @@ namespace coronary
 {
 namespace
 {
-constexpr double MouthLength = 4.0;  // mm of the branch that are narrowed
-constexpr double Beside = 3.0;       // mm of the vessel beside the mouth that count
-constexpr double Before = 2.0;       // mm of the parent before it, likewise
-constexpr double AngleAlong = 6.0;   // mm on which directions are taken
-constexpr double SmallestStep = 0.1; // of the parent's radius, from it to the vessel beside
-constexpr double Some = 0.02;        // mm that a section is held wider than it was
+constexpr double MouthLength = 4.0;   // mm of the branch that are narrowed
+constexpr double Beside = 3.0;        // mm of the vessel beside the mouth that count
+constexpr double Before = 2.0;        // mm of the parent before it, likewise
+constexpr double AngleAlong = 6.0;    // mm on which directions are taken
+constexpr double SmallestStep = 0.05; // of the parent's radius, from it to the vessel beside
+constexpr double Some = 0.02;         // mm that a section is held wider than it was
 
 /// The part of an axis from a point on, mm from there.
 std::vector<double> AlongFrom(const std::vector<Vector3>& axis, std::size_t first)
@@ -185,16 +185,21 @@ void BranchMouths::Answer(BranchMouth& mouth, bool wired, DilatableWall& wall) c
   const double shift = across ? std::clamp((widest - mouth.besideRadius) / step, 0.0, 1.0) : 0.0;
   const double kept = stented ? std::max(mouth.shift, shift) : shift;
   const bool more = kept > mouth.shift;
-  if (kept != mouth.shift)
+  double wanted = 0.0; // narrowing, if nothing kept it open
+  const bool changes = kept != mouth.shift;
+  if (changes)
   {
     mouth.shift = kept;
     const double narrowing = kept * mouth.cosine;
     for (const auto& [point, part] : mouth.own)
     {
+      const WallStation& station = wall.Stations()[point];
+      const double free = station.rest / station.reference + station.plastic;
+      wanted = std::max(wanted, 1.0 - (1.0 - narrowing * part) * free);
       wall.Pinch(point, narrowing * part, wired ? LeastRadius : ChannelRadius);
     }
   }
-  if (kept == 0.0 && !mouth.closed)
+  if (kept == 0.0 && !changes && !mouth.closed)
   {
     return;
   }
@@ -203,8 +208,7 @@ void BranchMouths::Answer(BranchMouth& mouth, bool wired, DilatableWall& wall) c
   {
     narrowest = std::max(narrowest, 1.0 - wall.Radii()[point] / wall.Stations()[point].reference);
   }
-  mouth.closed =
-    (mouth.closed && narrowest > ReopenedAt) || (more && !wired && narrowest >= ClosesAt);
+  mouth.closed = (mouth.closed && narrowest > ReopenedAt) || (more && !wired && wanted >= ClosesAt);
   mouth.degree = mouth.closed ? 1.0 : narrowest;
 }
 }

@@ -236,6 +236,10 @@ void DilatableWall::ReleaseRing(std::int64_t point, std::size_t rings, bool flow
 void DilatableWall::Pinch(std::int64_t point, double part, double least)
 {
   WallStation& station = this->Stations_[point];
+  if (station.stented >= 0)
+  {
+    return; // its ring holds it
+  }
   const double free = station.rest + station.plastic * station.reference;
   const double left = std::max(std::min(free, least), (1.0 - part) * free);
   station.pinched = (free - left) / station.reference;

@@ -86,6 +86,7 @@ public:
   double Resistance(std::int64_t point, double radius) const;
 
   /// What presses from outside leaves a section so much narrower where nothing presses from inside.
+  /// Where there is a stent it holds.
   /// @param part  of its radius, 0 to 1  @param least  mm that are left in any case
   void Pinch(std::int64_t point, double part, double least);
 

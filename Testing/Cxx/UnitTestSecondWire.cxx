@@ -1,6 +1,7 @@
 // Two wires in one guide: which one the hand drives, what holds a jailed one, and the mouth of the branch that it is in.
 #include "BalloonTestBench.h"
 #include "BranchMouths.h"
+#include "CoronaryFlow.h"
 #include "DrivenWire.h"
 #include "Numbers.h"
 #include "Recording.h"
@@ -209,7 +210,7 @@ TEST(TrappedWire, IsHeldByThePressureOnItsWidth)
   trap.Jail(0);
   trap.BeginFrame({ stent }, nullptr, wall, axis, axis, 1.0);
   ASSERT_TRUE(trap.Active());
-  const double outside = wall.Rings(80)[0].radius + 0.08;
+  const double outside = wall.Radii()[80] - 0.18;
   const double pressure =
     0.101325 * WallPressure(wall.Stations()[80], wall.Radii()[80], wall.Settings());
   ASSERT_GT(pressure, 0.05);
@@ -341,15 +342,20 @@ TEST(SecondWire, TheHandDrivesOneAndTheOtherOneIsAsIfItWereAlone)
 
 TEST(SecondWire, IsRefusedWhereItDoesNotFitBesideTheBalloon)
 {
-  EXPECT_NO_THROW(RequireFitBeside(Balloon("stent-3.5x18"), Wire("workhorse"), Guide("EBU3.5-6F")));
+  EXPECT_NO_THROW(RequireFitBeside(Balloon("stent-3.5x23"), Wire("workhorse"), Guide("EBU3.5-5F")));
+  EXPECT_NO_THROW(RequireFit(Balloon("semi-compliant-2.0x15"), Guide("JL4-4F")));
   ExpectRefusal([]
-    { RequireFitBeside(Balloon("stent-3.5x18"), Wire("workhorse"), Guide("EBU3.5-5F")); },
+    { RequireFitBeside(Balloon("semi-compliant-2.0x15"), Wire("workhorse"), Guide("JL4-4F")); },
     "do not fit beside each other");
   Scenario scenario = LoadScenario("lad-lesion");
   scenario.secondWire = Wire("workhorse");
-  scenario.catheter = Guide("EBU3.5-5F");
-  scenario.exchanges = { Balloon("stent-3.5x18") };
-  ExpectRefusal([&] { TrainingSession(LesionedPhantom(), scenario); }, "stent-3.5x18");
+  scenario.catheter = Guide("JL4-4F");
+  scenario.balloon = Balloon("semi-compliant-2.0x15");
+  ExpectRefusal([&] { TrainingSession(LesionedPhantom(), scenario); }, "semi-compliant-2.0x15");
+  scenario.catheter = Guide("JL4-6F");
+  scenario.exchanges = { Balloon("semi-compliant-2.0x15") };
+  scenario.exchanges[0].crossingRadius = 0.75;
+  ExpectRefusal([&] { TrainingSession(LesionedPhantom(), scenario); }, "fit beside each other");
   scenario = LoadScenario("lad-lesion");
   const auto refused = [&](const std::string& members, const char* why)
   {
@@ -371,5 +377,172 @@ TEST(SecondWire, IsRefusedWhereItDoesNotFitBesideTheBalloon)
   EXPECT_FALSE(session.Apply({ RecordedEvent::TakeWire, 1.0 }));
   EXPECT_EQ(session.TakeMessages().back(), "There is no second wire in this scenario.");
   EXPECT_TRUE(session.Apply({ RecordedEvent::TakeWire, 0.0 }));
+}
+
+namespace
+{
+/// Recorded hands, but for what they do with the second wire.
+class FirstWireOnly : public TickSource
+{
+public:
+  explicit FirstWireOnly(const std::string& path)
+    : Whole(path)
+  {
+  }
+  const RecordingReader& Reader() const { return this->Whole.Reader(); }
+  bool At(std::uint64_t tick, SessionInput& input, std::vector<RecordedEvent>& events) override
+  {
+    std::vector<RecordedEvent> all;
+    const bool goesOn = this->Whole.At(tick, this->Raw, all);
+    input = this->Raw;
+    for (const RecordedEvent& event : all)
+    {
+      if (event.kind == RecordedEvent::TakeWire)
+      {
+        this->Second = event.value == 1.0;
+      }
+      else
+      {
+        events.push_back(event);
+      }
+    }
+    const DriveInput now = input.drive;
+    this->LeftOut.wirePosition += this->Second ? now.wirePosition - this->Last.wirePosition : 0.0;
+    this->LeftOut.wireAngle += this->Second ? now.wireAngle - this->Last.wireAngle : 0.0;
+    this->Last = now;
+    input.drive.wirePosition -= this->LeftOut.wirePosition;
+    input.drive.wireAngle -= this->LeftOut.wireAngle;
+    return goesOn;
+  }
+
+private:
+  ReplaySource Whole;
+  SessionInput Raw;
+  bool Second = false;
+  DriveInput Last;
+  DriveInput LeftOut;
+};
+
+const std::string Recorded =
+  std::string(DYNAMICCORONARY_SOURCE_DIR) + "/Testing/Data/Driving/lad-bifurcation.pcirec";
+
+std::shared_ptr<WallMotion> WallFor(const Scenario& scenario)
+{
+  return std::make_shared<NarrowedWallMotion>(
+    MakePhantomWallMotion(scenario.vessels.phantom, scenario.vessels.phantom.surfaceSpacing, 40),
+    scenario.lesions);
+}
+
+const MouthResult& MouthOf(const std::vector<MouthResult>& mouths, const std::string& vessel)
+{
+  return *std::find_if(
+    mouths.begin(), mouths.end(), [&](const MouthResult& mouth) { return mouth.vessel == vessel; });
+}
+
+std::ptrdiff_t Count(const TrainingSession& session, ProcedureEvent::Kind kind)
+{
+  const std::vector<ProcedureEvent>& events = session.Metrics().events;
+  return std::count_if(
+    events.begin(), events.end(), [&](const ProcedureEvent& event) { return event.kind == kind; });
+}
+}
+
+// Recorded hands: an angiogram, a wire in the LAD, one in the diagonal, a stent across its mouth, the jailed wire drawn out.
+TEST(Bifurcation, TheRecordedOneRepeatsToTheBit)
+{
+  auto source = std::make_unique<ReplaySource>(Recorded);
+  const ReplaySource* replay = source.get();
+  const Scenario scenario = RecordedScenario(source->Reader().Header().scenario, "The recording");
+  const std::shared_ptr<WallMotion> wall = WallFor(scenario);
+  const std::uint64_t hash = WallHash(*wall);
+  ASSERT_EQ(hash, source->Reader().Header().meshHash);
+  SessionRunner runner(wall, scenario, hash, std::move(source));
+  const TrainingSession& session = runner.Session();
+  int outside = 0;
+  double held = 0.0;   // mm
+  double grip = 0.0;   // N, of the jailed wire
+  double jailed = 0.0; // N at the hand, most that it takes to draw it
+  double free = 0.0;   // likewise, once it is free
+  double narrowest = 0.0;
+  runner.afterTick = [&](const SessionReport& report)
+  {
+    const WireReport& second = report.tick.wires[1];
+    outside += report.tick.outside;
+    held = std::max(held, second.held);
+    grip = std::max(grip, second.jailed ? second.grip : 0.0);
+    if (report.tick.hand == 1 && !session.Instruments().Stents().empty())
+    {
+      (second.jailed ? jailed : free) = std::max(second.jailed ? jailed : free, -second.force);
+    }
+  };
+  std::string said;
+  runner.say = [&](std::uint64_t /*tick*/, const std::string& text) { said += text + "\n"; };
+  while (runner.Run(1000))
+  {
+    narrowest = std::max(narrowest, MouthOf(session.Mouths(), "D1").degree);
+  }
+  EXPECT_EQ(replay->Reader().HowEnded(), RecordingReader::Ending::Complete);
+  EXPECT_GT(runner.Compared().compared, 50U);
+  EXPECT_EQ(runner.Compared().equal, runner.Compared().compared)
+    << "from tick " << runner.Compared().firstDifference;
+  EXPECT_EQ(outside, 0);
+  EXPECT_GT(held, 5.0);
+  EXPECT_LT(held, 18.0) << "shorter than the stent: it leaves for the diagonal";
+  EXPECT_GT(grip, 0.03);
+  EXPECT_GT(jailed, 1.5 * free);
+  EXPECT_NE(said.find("The second wire is jailed"), std::string::npos) << said;
+  EXPECT_NE(said.find("The second wire is free of the stent"), std::string::npos) << said;
+  EXPECT_EQ(Count(session, ProcedureEvent::Kind::SideBranchClosed), 0);
+  EXPECT_GT(narrowest, 0.5) << "the stent pinches it";
+  const std::vector<MouthResult> mouths = session.Mouths();
+  EXPECT_FALSE(MouthOf(mouths, "D1").closed);
+  EXPECT_GT(MouthOf(mouths, "D1").reserve, 0.8);
+  const std::vector<StentResult> stents = session.Stents();
+  ASSERT_EQ(stents.size(), 1U);
+  EXPECT_FALSE(stents[0].missedAll);
+  ASSERT_EQ(session.Procedure().reached.size(), scenario.procedure.size())
+    << NextOf(scenario.procedure, session.Procedure());
+  EXPECT_TRUE(session.Score().passed);
+}
+
+// The same hands on the first wire, and the diagonal without protection.
+TEST(Bifurcation, WithoutASecondWireTheBranchCloses)
+{
+  auto source = std::make_unique<FirstWireOnly>(Recorded);
+  const Scenario scenario = RecordedScenario(source->Reader().Header().scenario, "The recording");
+  const std::shared_ptr<WallMotion> wall = WallFor(scenario);
+  SessionRunner runner(wall, scenario, WallHash(*wall), std::move(source));
+  const TrainingSession& session = runner.Session();
+  std::string said;
+  runner.say = [&](std::uint64_t /*tick*/, const std::string& text) { said += text + "\n"; };
+  while (runner.Run(1000) && Count(session, ProcedureEvent::Kind::SideBranchClosed) == 0)
+  {
+  }
+  runner.Run(2000);
+  EXPECT_NE(said.find("The side branch D1 is closed"), std::string::npos) << said;
+  const std::vector<ProcedureEvent>& events = session.Metrics().events;
+  const auto closed = std::find_if(events.begin(), events.end(),
+    [](const ProcedureEvent& event)
+    { return event.kind == ProcedureEvent::Kind::SideBranchClosed; });
+  ASSERT_NE(closed, events.end());
+  EXPECT_EQ(session.Topology().groupName[closed->branch], "D1");
+  EXPECT_NEAR(closed->place, 33.7, 0.5);
+  const std::vector<MouthResult> mouths = session.Mouths();
+  EXPECT_TRUE(MouthOf(mouths, "D1").closed);
+  EXPECT_LT(MouthOf(mouths, "D1").reserve, 0.2);
+  const CoronaryFlow& flow = session.Contrast().FlowModel();
+  const std::vector<double> tips = flow.TipFlows();
+  double lost = 0.0;
+  for (std::size_t n = 0; n < tips.size(); ++n)
+  {
+    const int above = flow.Network().Nodes()[n].above;
+    const bool inside = above >= 0 && flow.Network().IsTip(static_cast<int>(n)) &&
+      session.Topology().groupName[flow.Network().Segments()[above].branch] == "D1";
+    lost += inside ? tips[n] : 0.0;
+  }
+  EXPECT_LT(std::abs(lost), 1e-3) << "mL/s";
+  const std::vector<std::string> failures = session.Score().failures;
+  EXPECT_NE(std::find(failures.begin(), failures.end(), "the side branch D1 is left closed"),
+    failures.end());
 }
 }
