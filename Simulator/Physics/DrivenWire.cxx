@@ -337,8 +337,7 @@ void DrivenWire::PutBack()
     const std::int64_t i = contact.segment;
     const double radius = this->Segments_[i].radius;
     const std::int64_t index = i * this->Rod_.SamplesPerSegment() + contact.sample;
-    if (contact.gap > -0.9 * radius || !this->InVessel[index] ||
-      this->Held[index] == TrappedWire::At::Held || i + 1 == this->Rod_.Size())
+    if (contact.gap > -0.9 * radius || !this->InVessel[index] || i + 1 == this->Rod_.Size())
     {
       continue;
     }
@@ -400,12 +399,10 @@ void DrivenWire::Reset()
     count - 1, this->Behind.Stiffness(), this->Behind.Angle() - this->Last.angle);
 }
 
-void DrivenWire::Step(std::uint64_t tick, double tickSeconds)
+void DrivenWire::Step(double seconds)
 {
   this->PutBack_ = 0;
-  const auto ticks = static_cast<double>(tick - this->LastTick);
-  this->LastTick = tick;
-  const RodStep& step = this->Rod_.Step(ticks * tickSeconds, this);
+  const RodStep& step = this->Rod_.Step(seconds, this);
   if (!step.finite || step.maximumGap > 5.0)
   {
     this->Reset();
@@ -414,7 +411,7 @@ void DrivenWire::Step(std::uint64_t tick, double tickSeconds)
   {
     this->PutBack();
     this->CapForce = this->Room.plugs.Press(this->Rod_);
-    if (tick % 200 == 0 && step.maximumGap < 0.05 && this->PutBack_ == 0)
+    if (this->Room.tick % 200 == 0 && step.maximumGap < 0.05 && this->PutBack_ == 0)
     {
       this->KeepSane();
     }

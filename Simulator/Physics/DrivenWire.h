@@ -54,8 +54,7 @@ public:
   void Carry(double way) { this->Fed_ += way; }
   void Feed();
   ///@}
-  /// @param tick  that it is at the end of
-  void Step(std::uint64_t tick, double tickSeconds);
+  void Step(double seconds);
   /// Into what a report has of the wire in hand.
   void Measure(TickReport& report) const;
   /// Of the last steps.
@@ -129,7 +128,6 @@ private:
   double LastFed = 0.0; ///< of the step before
   double LastCatheterTip = 0.0;
   double LastCatheterAngle = 0.0;
-  std::uint64_t LastTick = 0;
   WireInGuide Behind; ///< the wire between the rod and the hand
   BalloonOnWire* Sleeve = nullptr;
   TrappedWire Trap_;

@@ -432,18 +432,13 @@ void Intervention::Internals::Drive(const DriveInput& input)
   }
 }
 
-/// A wire that no hand is on, and no balloon out of the guide, is stepped every other tick.
 void Intervention::Internals::StepWires()
 {
   this->Report.outside = 0;
-  for (std::size_t n = 0; n < this->Wires.size(); ++n)
+  for (const std::unique_ptr<DrivenWire>& wire : this->Wires)
   {
-    const bool carries = this->Sleeve && n == this->SleeveWire && !this->SleeveIsParked();
-    if (n == this->InHand || carries || this->Room.tick % 2 == 0)
-    {
-      this->Wires[n]->Step(this->Room.tick, this->Step);
-      this->Report.outside += this->Wires[n]->PutBackNow();
-    }
+    wire->Step(this->Step);
+    this->Report.outside += wire->PutBackNow();
   }
 }
 

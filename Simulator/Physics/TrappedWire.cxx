@@ -11,9 +11,11 @@ constexpr double MegapascalPerAtm = 0.101325;
 constexpr double Opened = 0.05;     // mm that a balloon is wider than folded, to be in the way
 constexpr double Deepest = 0.05;    // mm that an obstacle pushes with at most
 constexpr double LeavesAt = 0.1;    // mm beyond the wall: it goes into a side branch there
+constexpr double Compressed = 0.1;  // mm
 constexpr double Softness = 0.02;   // mm, as RodSettings
 constexpr double Stiffness = 20.0;  // N/mm of a sample, of what is open
 constexpr double LeastForce = 1e-4; // N
+constexpr double FacesWall = 0.5;   // cosine
 constexpr int ForgottenAfter = 12;  // frames: a fifth of a second
 
 double Mixed(double now, double next, double share)
@@ -157,8 +159,6 @@ TrappedWire::At TrappedWire::MeetChain(
   const double inside = mixed(&Station::insideNow, &Station::insideNext);
   const double wall = mixed(&Station::wallNow, &Station::wallNext);
   const bool room = wall - inside > 2.0 * sample.radius;
-  const double held = wall - sample.radius; // of its middle, where there is none
-  const double least = room ? inside + sample.radius : held;
   const Vector3 axis = (at(b) - at(a)).normalized();
   Vector3 across = sample.centre - (1.0 - along) * at(a) - along * at(b);
   across -= across.dot(axis) * axis;
@@ -167,34 +167,39 @@ TrappedWire::At TrappedWire::MeetChain(
   {
     return At::Free;
   }
+  const Vector3 outwards = distance > 1e-6 ? Vector3(across / distance) : axis.unitOrthogonal();
+  const bool atWall = contacts.count > 0 && contacts.plane[0].normal.dot(outwards) < -FacesWall;
   ContactPlane plane;
-  plane.normal = distance > 1e-6 ? Vector3(across / distance) : axis.unitOrthogonal();
+  if (atWall && !room)
+  {
+    // Pressed onto the wall from the other side.
+    const ContactPlane& other = contacts.plane[0];
+    const double pressure = Mixed(a.pressure, b.pressure, along);
+    const double force = std::max(LeastForce, pressure * 2.0 * sample.radius * length);
+    plane = other;
+    plane.normal = -other.normal;
+    // The same force wherever it lies: a spring that is long compressed.
+    plane.gap = -other.gap - Compressed;
+    plane.stiffness = force / (Compressed + 0.5 * Softness);
+    plane.identity = 1 - other.identity;
+    contacts.plane[1] = plane;
+    contacts.count = 2;
+    return At::Held;
+  }
+  const double least = std::min(inside + sample.radius, wall - sample.radius);
+  plane.normal = outwards;
   plane.gap = std::max(distance - least, -Deepest);
   plane.wallVelocity =
     ((1.0 - along) * (a.next - a.now) + along * (b.next - b.now)) / this->Seconds;
   plane.friction = sample.friction;
   plane.stiffness = Stiffness;
-  if (room)
+  if (plane.gap < Softness)
   {
     // Of three planes the furthest goes.
-    if (plane.gap < Softness)
-    {
-      contacts.count = std::min(contacts.count, 1);
-      plane.identity = contacts.count > 0 && contacts.plane[0].identity == 0 ? 1 : 0;
-      contacts.plane[contacts.count++] = plane;
-    }
-    return At::Beside;
+    contacts.count = std::min(contacts.count, 1);
+    plane.identity = contacts.count > 0 && contacts.plane[0].identity == 0 ? 1 : 0;
+    contacts.plane[contacts.count++] = plane;
   }
-  const double pressure = Mixed(a.pressure, b.pressure, along);
-  const double force = std::max(LeastForce, pressure * 2.0 * sample.radius * length);
-  plane.stiffness = 2.0 * force / Softness; // so much at no gap
-  plane.identity = 1;
-  contacts.plane[1] = plane;
-  plane.identity = 0;
-  plane.normal = -plane.normal;
-  plane.gap = std::max(held - distance, -Deepest);
-  contacts.plane[0] = plane;
-  contacts.count = 2;
-  return At::Held;
+  return At::Beside;
 }
 }

@@ -50,7 +50,7 @@ public:
 
   /**
    * @param length  mm of the wire that the sample stands for
-   * @param contacts  of the lumen; gets the obstacle, or is replaced
+   * @param contacts  of the lumen; gets what presses from the other side
    */
   At Meet(const ContactSample& sample, double length, SampleContacts& contacts) const;
 
