@@ -179,7 +179,7 @@ TrappedWire::At TrappedWire::MeetChain(
     plane = other;
     plane.normal = -other.normal;
     // The same force wherever it lies: a spring that is long compressed.
-    plane.gap = -other.gap - Compressed;
+    plane.gap = -Compressed;
     plane.stiffness = force / (Compressed + 0.5 * Softness);
     plane.identity = 1 - other.identity;
     contacts.plane[1] = plane;

@@ -2,6 +2,7 @@
 #include "BalloonTestBench.h"
 #include "BranchMouths.h"
 #include "CoronaryFlow.h"
+#include "DriveScript.h"
 #include "DrivenWire.h"
 #include "Numbers.h"
 #include "Recording.h"
@@ -385,6 +386,26 @@ TEST(SecondWire, IsRefusedWhereItDoesNotFitBesideTheBalloon)
   EXPECT_FALSE(session.Apply({ RecordedEvent::TakeWire, 1.0 }));
   EXPECT_EQ(session.TakeMessages().back(), "There is no second wire in this scenario.");
   EXPECT_TRUE(session.Apply({ RecordedEvent::TakeWire, 0.0 }));
+}
+
+TEST(SecondWire, ScriptsTakeItAndOldRecordingsHaveNoAnswerOfBranches)
+{
+  const std::string head = R"({ "format": "dynamiccoronary script", "version": 1, "pieces": )";
+  const DriveScript script =
+    DriveScriptFromText(head + R"([ { "seconds": 1 }, { "seconds": 2, "take_wire": 1 } ] })", "d");
+  EXPECT_TRUE(script.WiresTaken(0.0, 1.0).empty());
+  EXPECT_EQ(script.WiresTaken(1.0, 3.0), std::vector<double>{ 1.0 });
+  ExpectRefusal([&]
+    { DriveScriptFromText(head + R"([ { "seconds": 1, "take_wire": 2 } ] })", "d"); },
+    "'take_wire'");
+  const Scenario scenario = LoadScenario("lad-bifurcation");
+  EXPECT_TRUE(scenario.settings.branchesAnswer);
+  EXPECT_TRUE(RecordedScenario(ScenarioText(scenario), "r").settings.branchesAnswer);
+  std::string before = ScenarioText(scenario);
+  const std::string key = "\"side_branches_answer\": true,";
+  ASSERT_NE(before.find(key), std::string::npos);
+  before.erase(before.find(key), key.size());
+  EXPECT_FALSE(RecordedScenario(before, "r").settings.branchesAnswer);
 }
 
 namespace
