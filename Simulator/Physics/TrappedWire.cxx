@@ -8,12 +8,13 @@ namespace coronary
 namespace
 {
 constexpr double MegapascalPerAtm = 0.101325;
-constexpr double Opened = 0.05;     // mm that a balloon is wider than folded, to be in the way
-constexpr double Deepest = 0.05;    // mm that an obstacle pushes with at most
-constexpr double LeavesAt = 0.1;    // mm beyond the wall: it goes into a side branch there
-constexpr double Compressed = 0.1;  // mm
-constexpr double Softness = 0.02;   // mm, as RodSettings
-constexpr double Stiffness = 20.0;  // N/mm of a sample, of what is open
+constexpr double Opened = 0.05;    // mm that a balloon is wider than folded, to be in the way
+constexpr double Deepest = 0.05;   // mm that an obstacle pushes with at most
+constexpr double LeavesAt = 0.1;   // mm beyond the wall: it goes into a side branch there
+constexpr double Compressed = 0.1; // mm
+constexpr double Softness = 0.02;  // mm, as RodSettings
+constexpr double Stiffness =
+  4.0; // N/mm of a sample, of what is open: soft, so that a wire that is drawn does not hook
 constexpr double LeastForce = 1e-4; // N
 constexpr double FacesWall = 0.5;   // cosine
 constexpr int ForgottenAfter = 12;  // frames: a fifth of a second
