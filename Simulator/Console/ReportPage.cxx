@@ -149,6 +149,15 @@ std::string Results(const Json& session)
           { "FFR before", "ffr_before" }, { "now", "ffr" } },
         1);
   }
+  if (session.contains("side_branches") && !session["side_branches"].empty())
+  {
+    page += "<h2>Side branches</h2>\n" +
+      Table(session["side_branches"],
+        { { "vessel", "vessel" }, { "reference, mm", "reference_mm" },
+          { "stenosis before, %", "stenosis_before_percent" }, { "now, %", "stenosis_percent" },
+          { "FFR before", "ffr_before" }, { "now", "ffr" } },
+        1);
+  }
   if (session.contains("stents") && !session["stents"].empty())
   {
     page += "<h2>Stents</h2>\n" +

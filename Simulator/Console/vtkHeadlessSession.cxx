@@ -104,6 +104,23 @@ Json LesionsToJson(const std::vector<LesionResult>& lesions)
   return list;
 }
 
+/// Those that are narrower than before.
+Json MouthsToJson(const std::vector<MouthResult>& mouths)
+{
+  Json list = Json::array();
+  for (const MouthResult& one : mouths)
+  {
+    if (one.degree > one.degreeBefore)
+    {
+      list.push_back({ { "vessel", one.vessel }, { "reference_mm", one.reference },
+        { "place_mm", one.place }, { "stenosis_before_percent", 100.0 * one.degreeBefore },
+        { "stenosis_percent", 100.0 * one.degree }, { "closed", one.closed },
+        { "ffr_before", one.reserveBefore }, { "ffr", one.reserve } });
+    }
+  }
+  return list;
+}
+
 Json StentsToJson(const std::vector<StentResult>& stents)
 {
   Json list = Json::array();
@@ -241,7 +258,7 @@ public:
       this->Curves[n].values.push_back(values[n]);
     }
     this->AddBalloon(session, seconds);
-    const std::vector<Vector3>& line = intervention.Centerline();
+    const std::vector<Vector3>& line = intervention.Centerline(report.hand);
     if (line.size() > 1)
     {
       const Vector3 ahead = (line[0] - line[1]).normalized();
@@ -572,6 +589,15 @@ public:
         one.vessel.c_str(), 100.0 * one.degree, one.reference, 100.0 * one.degreeBefore,
         one.reserve, one.reserveBefore);
     }
+    for (const MouthResult& one : this->Runner.Session().Mouths())
+    {
+      if (one.degree > one.degreeBefore)
+      {
+        std::printf("mouth of %s: %.0f %% of %.2f mm, was %.0f %%; FFR %.2f, was %.2f\n",
+          one.vessel.c_str(), 100.0 * one.degree, one.reference, 100.0 * one.degreeBefore,
+          one.reserve, one.reserveBefore);
+      }
+    }
     for (const StentResult& one : this->Runner.Session().Stents())
     {
       if (const StentRingResult* narrowest = one.Narrowest())
@@ -645,6 +671,10 @@ private:
     result["motion"] = this->World.motion;
     result["notes"] = this->World.notes;
     result["wire"] = scenario.wire.name;
+    if (scenario.secondWire)
+    {
+      result["second_wire"] = scenario.secondWire->name;
+    }
     result["catheter"] = scenario.catheter.name;
     result["tick_hz"] = this->Rate;
     result["seconds"] = static_cast<double>(this->Runner.Tick()) / this->Rate;
@@ -663,6 +693,7 @@ private:
     if (scenario.balloon)
     {
       result["stents"] = StentsToJson(this->Runner.Session().Stents());
+      result["side_branches"] = MouthsToJson(this->Runner.Session().Mouths());
     }
     result["state_hash_interval"] = RecordedHashInterval;
     result["state_hashes"] = this->Hashes;
@@ -792,6 +823,8 @@ Json NameOfEvent(std::uint8_t kind)
       return "flush_mL";
     case RecordedEvent::Incident:
       return "event_number";
+    case RecordedEvent::TakeWire:
+      return "wire_in_hand";
     default:
       return static_cast<int>(kind);
   }

@@ -100,6 +100,12 @@ void WriteInstruments(const std::string& path, const Intervention& intervention,
       stent.line, 3, [&](double) { return stent.radii[place++]; }, points, lines, radius, abscissa,
       instruments);
   }
+  if (intervention.NumberOfWires() > 1)
+  {
+    AddLine(
+      intervention.Centerline(1), 4, [&](double s) { return RadiusAt(intervention.Wire(1), s); },
+      points, lines, radius, abscissa, instruments);
+  }
   data->SetPoints(points);
   data->SetLines(lines);
   data->GetPointData()->AddArray(radius);

@@ -282,6 +282,9 @@ void vtkSimulatorScene::MakeInstruments(const Scenario& scenario)
   make(this->WireLine, this->WireTube, this->WireActor, wire, 6);
   this->WireActor->GetProperty()->SetColor(0.75, 0.95, 1.0);
   this->WireActor->GetProperty()->SetAmbient(0.5);
+  make(this->SecondLine, this->SecondTube, this->SecondActor, wire, 6);
+  this->SecondActor->GetProperty()->SetColor(0.7, 1.0, 0.6);
+  this->SecondActor->GetProperty()->SetAmbient(0.5);
   make(
     this->CatheterLine, this->CatheterTube, this->CatheterActor, scenario.catheter.outerRadius, 10);
   this->CatheterActor->GetProperty()->SetColor(0.93, 0.8, 0.3);
@@ -393,6 +396,10 @@ void vtkSimulatorScene::Update(const SessionSnapshot& snapshot)
     SetPoints(this->AortaMesh, this->AortaPoints);
   }
   SetLine(this->WireLine, snapshot.wire);
+  if (!snapshot.secondWire.empty() || this->SecondLine->GetNumberOfPoints() > 0)
+  {
+    SetLine(this->SecondLine, snapshot.secondWire);
+  }
   SetLine(this->CatheterLine, snapshot.catheter);
   if (snapshot.balloon.size() > 1 || this->BalloonLine->GetNumberOfPoints() > 0)
   {

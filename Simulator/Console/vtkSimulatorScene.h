@@ -97,6 +97,9 @@ private:
   vtkNew<vtkPolyData> WireLine;
   vtkNew<vtkTubeFilter> WireTube;
   vtkNew<vtkActor> WireActor;
+  vtkNew<vtkPolyData> SecondLine; ///< likewise
+  vtkNew<vtkTubeFilter> SecondTube;
+  vtkNew<vtkActor> SecondActor;
   vtkNew<vtkPolyData> CatheterLine;
   vtkNew<vtkTubeFilter> CatheterTube;
   vtkNew<vtkActor> CatheterActor;

@@ -70,6 +70,8 @@ DrivePiece PieceOf(JsonFields& member, PiecesOf form)
   piece.exchange = static_cast<double>(member.Whole("exchange", 0, MostExchanges, 0));
   piece.exchangesWire = member.Has("exchange_wire");
   piece.wire = static_cast<double>(member.Whole("exchange_wire", 0, MostExchanges, 0));
+  piece.takesWire = member.Has("take_wire");
+  piece.hand = static_cast<double>(member.Whole("take_wire", 0, 1, 0));
   piece.setsBreaths = member.Has("breaths_per_min");
   piece.breaths = member.Number("breaths_per_min", 0.0, MaximumBreaths, 0.0);
   piece.flushes = member.Has("flush_mL");
@@ -171,6 +173,11 @@ std::vector<double> DriveScript::Exchanges(double from, double to) const
 std::vector<double> DriveScript::WireExchanges(double from, double to) const
 {
   return this->Chosen(from, to, &DrivePiece::exchangesWire, &DrivePiece::wire);
+}
+
+std::vector<double> DriveScript::WiresTaken(double from, double to) const
+{
+  return this->Chosen(from, to, &DrivePiece::takesWire, &DrivePiece::hand);
 }
 
 std::vector<double> DriveScript::BreathRates(double from, double to) const

@@ -28,6 +28,8 @@ struct DrivePiece
   double exchange = 0.0;      ///< number of the balloon that is taken
   bool exchangesWire = false; ///< when the piece begins
   double wire = 0.0;          ///< number of the wire that is taken
+  bool takesWire = false;     ///< when the piece begins, before it exchanges
+  double hand = 0.0;          ///< number of the wire that the hand is on: 0 the first, 1 the second
   bool setsBreaths = false;   ///< when the piece begins
   double breaths = 0.0;       ///< a minute; 0: the breath is held
   bool flushes = false;       ///< when the piece begins
@@ -55,6 +57,7 @@ public:
   /// Likewise numbers of the balloons that are taken.
   std::vector<double> Exchanges(double from, double to) const;
   std::vector<double> WireExchanges(double from, double to) const; ///< likewise of the wires
+  std::vector<double> WiresTaken(double from, double to) const; ///< likewise of the wires in hand
   /// Likewise breaths a minute.
   std::vector<double> BreathRates(double from, double to) const;
   std::vector<double> Flushes(double from, double to) const; ///< likewise mL of saline

@@ -179,13 +179,19 @@ double GuideFromArch::Most() const
   return this->Tube.Most() - this->Start;
 }
 
-void GuideFromArch::Step(
-  double position, double angle, const Guidewire& wire, double inserted, double thrust)
+void GuideFromArch::Step(double position, double angle,
+  const std::vector<std::pair<const Guidewire*, double>>& wires, double thrust)
 {
-  if (std::abs(inserted - this->Carried) > SameWire)
+  this->Carried.resize(wires.size(), 1e9);
+  bool same = true;
+  for (std::size_t n = 0; n < wires.size(); ++n)
   {
-    this->Carried = inserted;
-    this->Tube.Carry(wire, inserted);
+    same = same && std::abs(wires[n].second - this->Carried[n]) <= SameWire;
+  }
+  for (std::size_t n = 0; n < wires.size() && !same; ++n)
+  {
+    this->Carried[n] = wires[n].second;
+    this->Tube.Carry(*wires[n].first, wires[n].second, n > 0);
   }
   const double share = -std::expm1(-1.0 / (this->TickRate * ThrustTime));
   this->Thrust += share * ((std::isfinite(thrust) ? thrust : 0.0) - this->Thrust);

@@ -12,6 +12,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 namespace coronary
@@ -51,10 +52,11 @@ public:
 
   /**
    * @param position  mm  @param angle  rad: of the hand, since the start
-   * @param inserted  mm of the wire beyond its tip
-   * @param thrust    N by which the wire is pushed out of its tip
+   * @param wires     that lie in it, and mm of each beyond its tip
+   * @param thrust    N by which they are pushed out of its tip
    */
-  void Step(double position, double angle, const Guidewire& wire, double inserted, double thrust);
+  void Step(double position, double angle,
+    const std::vector<std::pair<const Guidewire*, double>>& wires, double thrust);
 
   double TipPlace() const { return this->Engagement + this->Tube.Inserted() - this->Start; } ///< u
   double Least() const; ///< mm that the hand can be at, and at most
@@ -103,8 +105,8 @@ private:
   double Start = 0.0;
   int Behind; ///< points of the way
   GuideInAorta Tube;
-  double Carried = 1e9; ///< mm of wire that the tube's stiffness was last made for
-  double Thrust = 0.0;  ///< N, smoothed
+  std::vector<double> Carried; ///< mm of wires that the tube's stiffness was last made for
+  double Thrust = 0.0;         ///< N, smoothed
   double TickRate;
   std::vector<Node> Nodes;
   std::vector<Vector3> Velocities; ///< mm/s, per point of the way

@@ -203,7 +203,7 @@ void GuideInAorta::Append()
     this->HeldOrientation() * Eigen::Quaterniond(Eigen::AngleAxisd(lag, Vector3::UnitZ())));
 }
 
-void GuideInAorta::Carry(const Guidewire& wire, double beyond)
+void GuideInAorta::Carry(const Guidewire& wire, double beyond, bool beside)
 {
   for (std::size_t i = 1; i < this->Bare.size(); ++i)
   {
@@ -211,7 +211,7 @@ void GuideInAorta::Carry(const Guidewire& wire, double beyond)
     const double after = this->Pieces.places[i];
     const double covered = std::clamp((after + beyond) / (after - before), 0.0, 1.0);
     RodJoint& joint = this->Pieces.joints[i];
-    joint = this->Bare[i];
+    joint = beside ? joint : this->Bare[i];
     if (covered > 0.0)
     {
       // A share of the joint: nothing jumps when the wire's tip passes it.

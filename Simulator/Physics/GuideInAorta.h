@@ -92,7 +92,8 @@ public:
     const GuideSettings& settings = {});
 
   /// A wire lies in it: straight but for what the guide bends it. @param beyond  mm of the guide's tip; may be negative
-  void Carry(const Guidewire& wire, double beyond);
+  /// @param beside  there is another one, that was said before
+  void Carry(const Guidewire& wire, double beyond, bool beside = false);
 
   /// N on its tip, of what is pushed through it; until set again.
   void SetTipForce(const Vector3& force) { this->TipForce = force; }

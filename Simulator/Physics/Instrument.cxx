@@ -63,6 +63,27 @@ void RequireFit(const Guidewire& wire, const GuideCatheter& catheter)
   }
 }
 
+void RequireFitBeside(
+  const BalloonCatheter& balloon, const Guidewire& wire, const GuideCatheter& catheter)
+{
+  double thickest = 0.0;
+  for (const WireSection& section : wire.sections)
+  {
+    thickest = std::max(thickest, section.radius);
+  }
+  if (balloon.Profile() + thickest > catheter.innerRadius)
+  {
+    char text[300];
+    std::snprintf(text, sizeof(text),
+      "the balloon '%s' (%.2f mm) and the wire '%s' (%.2f mm) do not fit beside each other into "
+      "the "
+      "catheter '%s' (%.2f mm inside)",
+      balloon.name.c_str(), 2.0 * balloon.Profile(), wire.name.c_str(), 2.0 * thickest,
+      catheter.name.c_str(), 2.0 * catheter.innerRadius);
+    throw std::invalid_argument(text);
+  }
+}
+
 void Guidewire::Validate() const
 {
   const std::string whose = "Wire '" + this->name + "'";

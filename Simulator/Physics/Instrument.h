@@ -204,6 +204,9 @@ struct BalloonCatheter
 /// @throws std::invalid_argument  naming the instrument and the property; one that does not fit into the catheter
 void RequireFit(const BalloonCatheter& balloon, const GuideCatheter& catheter);
 void RequireFit(const Guidewire& wire, const GuideCatheter& catheter);
+/// Side by side.
+void RequireFitBeside(
+  const BalloonCatheter& balloon, const Guidewire& wire, const GuideCatheter& catheter);
 ///@}
 }
 

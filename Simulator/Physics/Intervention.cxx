@@ -2,15 +2,14 @@
 
 #include "BalloonOnWire.h"
 #include "CatheterPath.h"
-#include "CosseratRod.h"
 #include "CyclicTime.h"
+#include "DrivenWire.h"
 #include "Fnv1a.h"
 #include "GuideFromArch.h"
 #include "OstialTree.h"
 #include "SettingLimits.h"
 #include "VesselWall.h"
 #include "WallMotion.h"
-#include "WireInGuide.h"
 
 #include <algorithm>
 #include <cmath>
@@ -23,56 +22,12 @@ namespace coronary
 namespace
 {
 constexpr double DrawnCatheter = 220.0; // mm
-constexpr double FloppyTip = 35.0;      // mm from the tip in which segments have two samples
-constexpr double ShortTip = 12.0;       // mm from the tip on which segments are half as long
-constexpr double StartInside =
-  2.0; // mm of the catheter between its tip and the wire's, at the beginning
-constexpr double SoftTip = 3.0;   // mm of the catheter
-constexpr double LossTime = 2e-3; // s
-constexpr double SpinDrag = 1e-6; // N s
-constexpr int MinimumSegments = 4;
-constexpr double CatheterReach = 10.0; // mm into the vessel
-constexpr double BalloonParked = 5.0;  // mm behind the simulated wire's end, at the beginning
-constexpr double ParkedWithin = 1.0;   // mm from there: it can be exchanged
-constexpr double Emptied = 0.5;        // atm, likewise
+constexpr double CatheterReach = 10.0;  // mm into the vessel
+constexpr double BalloonParked = 5.0;   // mm behind the simulated wire's end, at the beginning
+constexpr double ParkedWithin = 1.0;    // mm from there: it can be exchanged
+constexpr double Emptied = 0.5;         // atm, likewise
+const std::int64_t SamplesPerSegment = InstrumentRod().samples + 1;
 
-/// How much harder a vessel is than its stiffness against the bare wire: what begins a tick deep inside the wall, as a tip that
-/// a hand jams into the end of a thin vessel, must not come through with its middle. Usual contacts are a tenth as deep.
-double Hardening(double gap)
-{
-  constexpr double deepInside = 0.05;   // mm
-  constexpr double twiceAsHard = 0.025; // mm deeper
-  return 1.0 + std::max(0.0, -gap - deepInside) / twiceAsHard;
-}
-
-enum class Notice : int
-{
-  NotFinite = 0,
-  TooFast,
-  TurnedTooFast,
-  CatheterLimit,
-  WireAtTip,
-  WireAtEnd,
-  Reset,
-  PutBack,
-  BalloonLimit,
-  StentInGuide,
-  NotExchanged,
-  WireNotExchanged,
-  Count
-};
-
-const char* const NoticeText[] = { "the input is not finite: the instruments are held",
-  "the wire is driven faster than hands can: its speed is limited",
-  "the wire is turned faster than hands can: its speed is limited",
-  "the catheter is at the end of its way", "the wire is drawn back to the end of its way",
-  "no more of the wire can be simulated: it is advanced no further",
-  "the wire's equations could not be solved: it is set back to where it was last sane",
-  "the wire left the lumen and was put back",
-  "the balloon is at the end of its way: it has to stay on the wire, and in the guide",
-  "the stent is not wholly out of the guide catheter: its balloon is not inflated",
-  "the balloon is not exchanged: first it has to be emptied and drawn back into the guide",
-  "the wire is not exchanged: first it has to be drawn back into the guide" };
 }
 
 void InterventionSettings::Validate() const
@@ -93,15 +48,12 @@ void InterventionSettings::Validate() const
   RequireWithin(this->maximumTurning, 1.0, 1000.0, "maximumTurning");
 }
 
-struct Intervention::Internals : ContactSurface
+struct Intervention::Internals
 {
   std::shared_ptr<WallMotion> Motion;
-  Guidewire Wire;
-  GuideCatheter Catheter;
-  InterventionSettings Settings;
+  WireRoom Room;
 
   double Step = 0.0; // s
-  std::uint64_t Tick = 0;
   double Phase = 0.0;
   double FrameSeconds = 0.0;
   int TickInFrame = 0;
@@ -112,6 +64,7 @@ struct Intervention::Internals : ContactSurface
   std::vector<Vector3> NowPoints;
   OstialTree Tree; // the engaged one: no wire comes to another
   std::vector<Vector3> NextTreePoints;
+  std::vector<Vector3> LastAxis;
   std::vector<Vector3> Axis;
   std::vector<Vector3> RootAxis;
 
@@ -120,30 +73,21 @@ struct Intervention::Internals : ContactSurface
   std::unique_ptr<CatheterPath> Rigid;
   std::unique_ptr<GuideFromArch> Free;
   std::unique_ptr<LengthenedInlet> Inlet; // with the free one
-  GuideWay* Path = nullptr;
-  std::unique_ptr<ArteryLumen> Artery; // with the rigid one
+  std::unique_ptr<ArteryLumen> Artery;    // with the rigid one
   InstrumentLumen* Lumen = nullptr;
-  std::unique_ptr<CosseratRod> Rod;
 
-  // All segments that there can be, from the tip.
-  std::vector<RodSegment> Segments;
-  std::vector<RodJoint> Joints;
-  std::vector<double> Places; // of their centres from the tip, mm
-  std::vector<char> InVessel; // per sample
+  std::vector<std::unique_ptr<DrivenWire>> Wires;
+  std::size_t InHand = 0;
+  std::vector<std::pair<const Guidewire*, double>> InGuide; // with the free one
 
-  double Fed = 0.0; // mm, where the tip would be on the straightened way: its u without bends
-  double HandPosition = 0.0; // as accepted
+  double HandPosition = 0.0; // as accepted, of whatever wire
   double HandAngle = 0.0;
-  double CatheterTip = 0.0; // u
-  double CatheterAngle = 0.0;
-  double LastFed = 0.0; // of the tick before
-  double LastCatheterTip = 0.0;
-  double LastCatheterAngle = 0.0;
-  WireInGuide Behind; // the wire between the rod and the hand
 
   // Null without a balloon; then nothing of these is used.
   std::unique_ptr<BalloonOnWire> Sleeve;
+  std::size_t SleeveWire = 0; // that it runs on
   std::unique_ptr<DilatableWall> Opening;
+  BranchMouths Mouths;
   VesselWay SleeveWay;
   int SleeveWayBranch = -1;
   double SleeveStart = 0.0; // u, where it is parked
@@ -151,245 +95,69 @@ struct Intervention::Internals : ContactSurface
   std::vector<PlacedStent> Stents;
   double Inflator = 0.0; // atm
 
-  OcclusionPlugs Plugs;
-
-  struct Sane
-  {
-    std::vector<Vector3> position;
-    std::vector<Eigen::Quaterniond> orientation;
-    double fed = 0.0;
-    double angle = 0.0; // of the rod's end
-  };
-  Sane Last;
-
   TickReport Report;
   std::vector<Vector3> Line;
   std::vector<Vector3> CatheterPoints;
-  std::array<std::uint64_t, static_cast<int>(Notice::Count)> NoticeTick{};
-  std::vector<std::string> Messages;
 
-  void Say(Notice notice)
-  {
-    std::uint64_t& last = this->NoticeTick[static_cast<int>(notice)];
-    if (last == 0 || this->Tick - last >= static_cast<std::uint64_t>(this->Settings.tickRate))
-    {
-      last = this->Tick;
-      char text[192];
-      std::snprintf(text, sizeof(text), "%.3f s: %s", static_cast<double>(this->Tick) * this->Step,
-        NoticeText[static_cast<int>(notice)]);
-      if (this->Messages.size() < 1000)
-      {
-        this->Messages.emplace_back(text);
-      }
-    }
-  }
-
-  void Find(const ContactSample& sample, double reach, SampleContacts& contacts) override
-  {
-    const int perSegment = this->Rod->SamplesPerSegment();
-    const std::int64_t segment = sample.index / perSegment;
-    const double expected = this->Fed - this->Places[segment];
-    char& inVessel = this->InVessel[sample.index];
-    contacts.count = 0;
-    if (expected < this->CatheterTip + 15.0)
-    {
-      const double u = this->Path->Nearest(
-        sample.centre, expected - 6.0, std::min(expected + 6.0, this->CatheterTip));
-      if (u < this->CatheterTip - 1e-9)
-      {
-        if (inVessel)
-        {
-          inVessel = 0;
-          this->Lumen->Forget(sample.index);
-        }
-        const PathPlace place = this->Path->At(u);
-        Vector3 across = sample.centre - place.position;
-        across -= place.tangent * place.tangent.dot(across);
-        const double distance = across.norm();
-        const double gap = this->Catheter.innerRadius - sample.radius - distance;
-        if (gap < reach && distance > 1e-9)
-        {
-          contacts.count = 1;
-          ContactPlane& plane = contacts.plane[0];
-          plane = ContactPlane();
-          plane.normal = across / -distance;
-          plane.gap = gap;
-          plane.wallVelocity = place.velocity;
-          plane.friction = this->Catheter.friction;
-          // Its tip is soft: the wire's load goes over from place to place as they leave it.
-          plane.stiffness =
-            this->Settings.wallStiffness * std::clamp((this->CatheterTip - u) / SoftTip, 0.01, 1.0);
-          if (this->InSleeve(segment))
-          {
-            this->NoFriction(contacts);
-          }
-        }
-        return;
-      }
-    }
-    inVessel = 1;
-    this->Lumen->Find(sample, reach, contacts);
-    if (this->InSleeve(segment))
-    {
-      this->NoFriction(contacts);
-      if (this->Sleeve->Opened(this->BehindSleeve(segment)))
-      {
-        this->OnlyAcross(this->Rod->Axis(segment), contacts);
-      }
-      return;
-    }
-    for (int p = 0; p < contacts.count; ++p)
-    {
-      contacts.plane[p].stiffness *= Hardening(contacts.plane[p].gap);
-    }
-    this->Plugs.Meet(sample, reach, contacts);
-  }
+  void Say(Notice notice) { this->Room.notices.Say(notice, this->Room.tick); }
+  DrivenWire& Hand() { return *this->Wires[this->InHand]; }
+  DrivenWire& Carrier() { return *this->Wires[this->SleeveWire]; }
 
   /// mm to be added to u, so that it is counted from the ostium.
   double FromOstium() const
   {
-    return this->Free ? this->Report.catheterTip - this->CatheterTip : 0.0;
+    return this->Free ? this->Report.catheterTip - this->Room.catheterTip : 0.0;
   }
-  /// N by which the wire is pushed out of the catheter's tip.
-  double Thrust() const;
+  /// The balloon is wholly in the guide.
+  bool SleeveIsParked() const { return this->Sleeve->Tip() <= this->SleeveStart + ParkedWithin; }
 
-  /// mm behind the sleeve's tip.
-  double BehindSleeve(std::int64_t segment) const
-  {
-    return this->Places[segment] - this->Fed + this->Sleeve->Tip();
-  }
-  bool InSleeve(std::int64_t segment) const
-  {
-    return this->Sleeve && this->Sleeve->Covers(this->BehindSleeve(segment));
-  }
-  /// An open balloon is pressed along the vessel where that narrows; the wire in it is not: it slides.
-  static void OnlyAcross(const Vector3& axis, SampleContacts& contacts)
-  {
-    constexpr double Least = 0.3; // of a normal that is across
-    int kept = 0;
-    for (int n = 0; n < contacts.count; ++n)
-    {
-      ContactPlane plane = contacts.plane[n];
-      const Vector3 across = plane.normal - plane.normal.dot(axis) * axis;
-      const double share = across.norm();
-      if (share > Least)
-      {
-        plane.normal = across / share;
-        plane.gap /= share;
-        contacts.plane[kept++] = plane;
-      }
-    }
-    contacts.count = kept;
-  }
-  /// What touches is the sleeve; its friction is the sleeve's.
-  static void NoFriction(SampleContacts& contacts)
-  {
-    for (int n = 0; n < contacts.count; ++n)
-    {
-      contacts.plane[n].friction = 0.0;
-    }
-  }
-
-  void MakeSegments();
-  void Engage(const std::vector<Vector3>& points, std::int64_t samplesPerSegment);
+  void Engage(const std::vector<Vector3>& points);
   void RequireRoom(int root) const;
+  void AddWire(const Guidewire& wire);
   void MakeTreePoints(const Vector3& direction);
-  Eigen::Quaterniond HeldOrientation(const PathPlace& place) const;
-  double EndAngle() const;
-  void AppendSegment();
-  void PlaceOnPath();
   void BeginFrame();
   void Drive(const DriveInput& input);
-  void Feed();
   void DriveSleeve(const DriveInput& input);
   void OpenWall();
-  double SleevePlace() const;
-  BalloonOnWire::Rail Rail() const;
+  double SleevePlace();
+  void RequireFitting(const BalloonCatheter& balloon) const;
   void TakeBalloon(const BalloonCatheter& balloon);
-  void DriveBehind();
-  void PutBack();
-  void Reset();
-  void KeepSane();
+  void StepWires();
   void Measure();
 };
 
-void Intervention::Internals::MakeSegments()
-{
-  this->Segments.clear();
-  this->Joints.clear();
-  this->Places.clear();
-  const double whole = this->Settings.segmentLength;
-  double from = 0.0;
-  for (int i = 0; i < this->Settings.capacity; ++i)
-  {
-    const double length = from < ShortTip ? 0.5 * whole : whole;
-    const double middle = from + 0.5 * length;
-    const auto value = [&](double at, auto property)
-    { return AlongWire(this->Wire, at, property); };
-    RodSegment segment =
-      MakeRodSegment(length, value(middle, [](const WireSection& s) { return s.radius; }),
-        value(middle, [](const WireSection& s) { return s.density; }));
-    segment.friction = value(middle, [](const WireSection& s) { return s.friction; });
-    // 1 Pa s = 1e-6 N s/mm^2
-    segment.drag = this->Settings.drag * 1e-6 * length;
-    // More than blood would, too: a twisted wire that comes free spins within its lumen, not within a tick.
-    segment.rotationalDrag = SpinDrag * length;
-    // Where segments are short, or too stiff to bend between samples, one is enough.
-    segment.samples = length < whole || middle > FloppyTip ? 1 : 0;
-    this->Segments.push_back(segment);
-    this->Places.push_back(middle);
-    RodJoint joint;
-    if (i > 0)
-    {
-      const double distance = middle - this->Places[i - 1];
-      joint.angularStiffness =
-        Vector3(value(from, [](const WireSection& s) { return s.bendingStiffness1; }),
-          value(from, [](const WireSection& s) { return s.bendingStiffness2; }),
-          value(from, [](const WireSection& s) { return s.torsionalStiffness; })) /
-        distance;
-      joint.stretchStiffness =
-        value(from, [](const WireSection& s) { return s.axialStiffness; }) / distance;
-      joint.restAngle = Vector3(distance * RestCurvature(this->Wire, from), 0.0, 0.0);
-      joint.lossTime = LossTime;
-    }
-    this->Joints.push_back(joint);
-    from += length;
-  }
-}
-
-void Intervention::Internals::Engage(
-  const std::vector<Vector3>& points, std::int64_t samplesPerSegment)
+void Intervention::Internals::Engage(const std::vector<Vector3>& points)
 {
   const WallTopology& topology = this->Motion->Topology();
-  const int root = RootOf(topology, this->Settings.rootBranch);
+  const int root = RootOf(topology, this->Room.settings.rootBranch);
   this->RootFirst = static_cast<std::size_t>(FirstAxisPoint(topology, root));
   this->RootCount = topology.axis[root].size();
   this->Motion->AxisPositions(this->Phase, this->Axis);
   this->RootAxis.assign(this->Axis.begin() + static_cast<std::ptrdiff_t>(this->RootFirst),
     this->Axis.begin() + static_cast<std::ptrdiff_t>(this->RootFirst + this->RootCount));
-  const double behind = this->Settings.insideCatheter + 25.0;
+  const double behind = this->Room.settings.insideCatheter + 25.0;
   this->Rigid = std::make_unique<CatheterPath>(
-    this->RootAxis, this->Catheter, this->Settings.engagement, behind, CatheterReach);
-  this->Path = this->Rigid.get();
-  this->CatheterTip = std::min(this->Settings.engagement, this->Path->Last());
+    this->RootAxis, this->Room.catheter, this->Room.settings.engagement, behind, CatheterReach);
+  this->Room.path = this->Rigid.get();
+  this->Room.catheterTip = std::min(this->Room.settings.engagement, this->Room.path->Last());
   this->RequireRoom(root);
   this->Tree = MakeOstialTree(
-    topology, points, this->RootAxis.front(), this->Path->At(this->CatheterTip).position);
-  if (this->Settings.guideFromArch && topology.aorta)
+    topology, points, this->RootAxis.front(), this->Room.path->At(this->Room.catheterTip).position);
+  if (this->Room.settings.guideFromArch && topology.aorta)
   {
     GuideSettings guide;
-    guide.tickRate = this->Settings.tickRate;
-    this->Free = std::make_unique<GuideFromArch>(
-      this->Catheter, topology, this->Axis, root, this->Settings.engagement, behind, guide);
+    guide.tickRate = this->Room.settings.tickRate;
+    this->Free = std::make_unique<GuideFromArch>(this->Room.catheter, topology, this->Axis, root,
+      this->Room.settings.engagement, behind, guide);
     this->Inlet = std::make_unique<LengthenedInlet>(this->Tree, this->Free->InletLength());
-    this->Path = this->Free.get();
+    this->Room.path = this->Free.get();
     this->Rigid.reset();
-    this->CatheterTip = this->Free->TipPlace();
+    this->Room.catheterTip = this->Free->TipPlace();
   }
   this->MakeTreePoints(DirectionAtOstium(this->RootAxis));
   VesselWallSettings settings;
-  settings.friction = this->Settings.wallFriction;
-  settings.stiffness = this->Settings.wallStiffness;
+  settings.friction = this->Room.settings.wallFriction;
+  settings.stiffness = this->Room.settings.wallStiffness;
   if (this->Tree.cap > 1)
   {
     settings.openCaps.push_back(this->Tree.cap);
@@ -401,23 +169,32 @@ void Intervention::Internals::Engage(
     this->Lumen = &this->Free->Lumen();
     return;
   }
-  this->Artery = std::make_unique<ArteryLumen>(*this->Wall, this->Tree.inlet, samplesPerSegment);
+  this->Artery = std::make_unique<ArteryLumen>(*this->Wall, this->Tree.inlet, SamplesPerSegment);
   this->Lumen = this->Artery.get();
 }
 
 /// @throws std::invalid_argument  an instrument does not fit where it is at the beginning
 void Intervention::Internals::RequireRoom(int root) const
 {
-  const double narrowest = NarrowestBefore(this->Motion->Topology(), root, this->CatheterTip);
-  if (this->Catheter.outerRadius > narrowest)
+  const double narrowest = NarrowestBefore(this->Motion->Topology(), root, this->Room.catheterTip);
+  if (this->Room.catheter.outerRadius > narrowest)
   {
     char text[256];
     std::snprintf(text, sizeof(text),
       "the catheter '%s' is thicker (radius %.3f mm) than the lumen at the ostium (radius %.3f mm)",
-      this->Catheter.name.c_str(), this->Catheter.outerRadius, narrowest);
+      this->Room.catheter.name.c_str(), this->Room.catheter.outerRadius, narrowest);
     throw std::invalid_argument(text);
   }
-  RequireFit(this->Wire, this->Catheter);
+}
+
+/// @throws std::invalid_argument  it does not fit
+void Intervention::Internals::AddWire(const Guidewire& wire)
+{
+  RequireFit(wire, this->Room.catheter);
+  // Numbers of samples of two wires are a segment apart.
+  const auto number = static_cast<std::int64_t>(this->Wires.size());
+  const std::int64_t first = number * (this->Room.settings.capacity + 1) * SamplesPerSegment;
+  this->Wires.push_back(std::make_unique<DrivenWire>(wire, this->Room, *this->Lumen, first));
 }
 
 /// Of the engaged tree, out of the whole wall's that come next.
@@ -434,58 +211,26 @@ void Intervention::Internals::MakeTreePoints(const Vector3& direction)
   }
 }
 
-Eigen::Quaterniond Intervention::Internals::HeldOrientation(const PathPlace& place) const
-{
-  const double angle = this->Behind.Angle();
-  const Vector3 first =
-    std::cos(angle) * place.side + std::sin(angle) * place.tangent.cross(place.side);
-  Matrix3 frame;
-  frame.col(2) = -place.tangent; // from the tip backwards
-  frame.col(0) = first;
-  frame.col(1) = frame.col(2).cross(frame.col(0));
-  return Eigen::Quaterniond(frame);
-}
-
-/// By which the rod's end is turned: it lags behind what it hangs on.
-double Intervention::Internals::EndAngle() const
-{
-  return this->Behind.Angle() - this->Rod->Lag(this->Rod->Size() - 1);
-}
-
-void Intervention::Internals::AppendSegment()
-{
-  const std::int64_t i = this->Rod->Size();
-  const PathPlace place = this->Path->At(this->Fed - this->Places[i]);
-  const double lag = i > 0 ? this->Rod->Lag(i - 1) : 0.0;
-  this->Rod->Append(this->Segments[i], this->Joints[i], place.position,
-    this->HeldOrientation(place) * Eigen::Quaterniond(Eigen::AngleAxisd(lag, Vector3::UnitZ())));
-}
-
-void Intervention::Internals::PlaceOnPath()
-{
-  const double datum = this->CatheterTip - this->Settings.insideCatheter;
-  while (
-    this->Rod->Size() < MinimumSegments || this->Fed - this->Places[this->Rod->Size() - 1] > datum)
-  {
-    this->AppendSegment();
-  }
-  const std::int64_t last = this->Rod->Size() - 1;
-  this->Rod->Prescribe(last, this->Rod->Position(last), this->Rod->Orientation(last));
-}
-
 void Intervention::Internals::BeginFrame()
 {
-  const double next = this->Phase + this->FrameSeconds * this->Settings.heartRate / 60.0;
+  const double next = this->Phase + this->FrameSeconds * this->Room.settings.heartRate / 60.0;
   this->LastPoints.swap(this->NextPoints);
   this->Motion->Positions(next, this->NextPoints);
   if (this->Sleeve)
   {
     this->OpenWall();
   }
+  this->LastAxis.swap(this->Axis);
   this->Motion->AxisPositions(next, this->Axis);
   if (this->Sleeve)
   {
     this->Opening->Deform(this->Axis, this->NextPoints);
+    for (std::size_t n = 0; n < this->Wires.size() && this->Wires.size() > 1; ++n)
+    {
+      this->Wires[n]->Trap().BeginFrame(this->Stents,
+        n == this->SleeveWire ? nullptr : this->Sleeve.get(), *this->Opening, this->LastAxis,
+        this->Axis, this->FrameSeconds);
+    }
   }
   std::copy_n(this->Axis.begin() + static_cast<std::ptrdiff_t>(this->RootFirst), this->RootCount,
     this->RootAxis.begin());
@@ -497,33 +242,30 @@ void Intervention::Internals::BeginFrame()
   }
   else
   {
-    this->Rigid->SetAngle(this->CatheterAngle);
+    this->Rigid->SetAngle(this->Room.catheterAngle);
     this->Rigid->BeginFrame(this->RootAxis, this->FrameSeconds);
   }
-  this->Plugs.BeginFrame(this->Axis, this->FrameSeconds);
+  this->Room.plugs.BeginFrame(this->Axis, this->FrameSeconds);
   this->TickInFrame = 0;
 }
 
-BalloonOnWire::Rail Intervention::Internals::Rail() const
-{
-  return { this->Fed, this->CatheterTip, &this->Places, &this->Segments, &this->Joints };
-}
-
 /// mm from the ostium of the balloon's middle, along its way.
-double Intervention::Internals::SleevePlace() const
+double Intervention::Internals::SleevePlace()
 {
   const double middle = this->Sleeve->Tip() - this->Sleeve->Device().Middle();
-  if (middle <= this->CatheterTip)
+  if (middle <= this->Room.catheterTip)
   {
     return middle + this->FromOstium();
   }
-  const double behind = this->Fed - middle; // mm of the wire
+  const DrivenWire& wire = this->Carrier();
+  const CosseratRod& rod = wire.Rod();
+  const double behind = wire.Fed() - middle; // mm of the wire
   std::int64_t i = 0;
-  while (i + 1 < this->Rod->Size() && this->Places[i + 1] < behind)
+  while (i + 1 < rod.Size() && wire.Places()[i + 1] < behind)
   {
     ++i;
   }
-  const Vector3 point = this->Rod->Position(i) + (behind - this->Places[i]) * this->Rod->Axis(i);
+  const Vector3 point = rod.Position(i) + (behind - wire.Places()[i]) * rod.Axis(i);
   double nearest = std::numeric_limits<double>::infinity();
   double place = 0.0;
   for (std::size_t n = 1; n < this->SleeveWay.points.size(); ++n)
@@ -542,16 +284,33 @@ double Intervention::Internals::SleevePlace() const
 
 void Intervention::Internals::OpenWall()
 {
-  if (this->Report.branch >= 0 && this->Report.branch != this->SleeveWayBranch)
+  const int branch = this->Carrier().Report().branch;
+  if (branch >= 0 && branch != this->SleeveWayBranch)
   {
-    this->SleeveWayBranch = this->Report.branch;
+    this->SleeveWayBranch = branch;
     this->SleeveWay = WayThrough(this->Motion->Topology(), this->SleeveWayBranch);
   }
   this->Sleeve->Inflate(this->FrameSeconds, this->Inflator, this->SleevePlace(),
-    this->CatheterTip + this->FromOstium(), this->SleeveWay, *this->Opening);
+    this->Room.catheterTip + this->FromOstium(), this->SleeveWay, *this->Opening);
   if (std::optional<PlacedStent> placed = this->Sleeve->TakePlaced())
   {
+    for (std::size_t n = 0; n < this->Wires.size(); ++n)
+    {
+      if (n != this->SleeveWire)
+      {
+        this->Wires[n]->Trap().Jail(this->Stents.size());
+      }
+    }
     this->Stents.push_back(std::move(*placed));
+  }
+  if (!this->Mouths.All().empty())
+  {
+    std::vector<int> within;
+    for (const std::unique_ptr<DrivenWire>& wire : this->Wires)
+    {
+      within.push_back(wire->Report().branch);
+    }
+    this->Mouths.Answer(within, *this->Opening);
   }
   if (this->Sleeve->Report().caught)
   {
@@ -561,7 +320,7 @@ void Intervention::Internals::OpenWall()
 
 void Intervention::Internals::DriveSleeve(const DriveInput& input)
 {
-  const double most = this->Settings.maximumSpeed * this->Step;
+  const double most = this->Room.settings.maximumSpeed * this->Step;
   double way = 0.0;
   if (std::isfinite(input.balloonPosition) && std::isfinite(input.inflation))
   {
@@ -570,21 +329,40 @@ void Intervention::Internals::DriveSleeve(const DriveInput& input)
     this->Inflator = std::clamp(input.inflation, -1.0, 40.0);
   }
   const double share =
-    static_cast<double>(this->TickInFrame) / static_cast<double>(this->Settings.ticksPerFrame);
-  if (!this->Sleeve->Drive(way, most, this->Rail(), share, *this->Rod))
+    static_cast<double>(this->TickInFrame) / static_cast<double>(this->Room.settings.ticksPerFrame);
+  DrivenWire& wire = this->Carrier();
+  if (!this->Sleeve->Drive(way, most, wire.Rail(), share, wire.Rod()))
   {
     this->Say(Notice::BalloonLimit);
+  }
+}
+
+/// @throws std::invalid_argument  it does not fit into the guide, or not beside the other wire
+void Intervention::Internals::RequireFitting(const BalloonCatheter& balloon) const
+{
+  RequireFit(balloon, this->Room.catheter);
+  if (this->Wires.size() > 1)
+  {
+    for (const std::unique_ptr<DrivenWire>& wire : this->Wires)
+    {
+      RequireFitBeside(balloon, wire->Device(), this->Room.catheter);
+    }
   }
 }
 
 /// @throws std::invalid_argument  it does not fit
 void Intervention::Internals::TakeBalloon(const BalloonCatheter& balloon)
 {
-  RequireFit(balloon, this->Catheter);
+  this->RequireFitting(balloon);
   const WallTopology& topology = this->Motion->Topology();
-  this->SleeveStart = this->CatheterTip - this->Settings.insideCatheter - BalloonParked;
-  this->Sleeve = std::make_unique<BalloonOnWire>(balloon, this->Catheter, this->SleeveStart);
+  this->SleeveStart = this->Room.catheterTip - this->Room.settings.insideCatheter - BalloonParked;
+  this->Sleeve = std::make_unique<BalloonOnWire>(balloon, this->Room.catheter, this->SleeveStart);
   this->Opening = std::make_unique<DilatableWall>(topology, this->NextPoints, this->Axis);
+  if (this->Room.settings.branchesAnswer)
+  {
+    this->Mouths = BranchMouths(topology);
+  }
+  this->Carrier().SetSleeve(this->Sleeve.get());
   int root = 0;
   while (FirstAxisPoint(topology, root) < static_cast<std::int64_t>(this->RootFirst))
   {
@@ -602,14 +380,14 @@ void Intervention::Internals::Drive(const DriveInput& input)
     this->Say(Notice::NotFinite);
     return;
   }
-  const double most = this->Settings.maximumSpeed * this->Step;
+  const double most = this->Room.settings.maximumSpeed * this->Step;
   double way = input.wirePosition - this->HandPosition;
   if (std::abs(way) > most * (1.0 + 1e-9))
   {
     this->Say(Notice::TooFast);
     way = std::clamp(way, -most, most);
   }
-  const double mostTurn = this->Settings.maximumTurning * this->Step;
+  const double mostTurn = this->Room.settings.maximumTurning * this->Step;
   double turn = input.wireAngle - this->HandAngle;
   if (std::abs(turn) > mostTurn * (1.0 + 1e-9))
   {
@@ -618,235 +396,82 @@ void Intervention::Internals::Drive(const DriveInput& input)
   }
   this->HandAngle += turn;
   this->HandPosition += way;
-  this->Fed += way;
+  this->Hand().Advance(way, turn);
 
   // The catheter is moved by a hand, too: slowly.
   const double mostTip = 50.0 * this->Step;
-  const double wanted = this->Settings.engagement + input.catheterPosition;
-  const double least = this->Free ? this->Settings.engagement + this->Free->Least() : 0.5;
+  const double wanted = this->Room.settings.engagement + input.catheterPosition;
+  const double least = this->Free ? this->Room.settings.engagement + this->Free->Least() : 0.5;
   const double greatest =
-    this->Free ? this->Settings.engagement + this->Free->Most() : this->Path->Last();
+    this->Free ? this->Room.settings.engagement + this->Free->Most() : this->Room.path->Last();
   const double allowed = std::clamp(wanted, least, greatest);
   if (wanted != allowed)
   {
     this->Say(Notice::CatheterLimit);
   }
-  const double moved = std::clamp(allowed - this->CatheterTip, -mostTip, mostTip);
-  this->CatheterTip += moved;
-  // A guide that is brought to the ostium takes the wire along: the valve at its end holds it.
-  this->Fed += this->Free ? moved : 0.0;
-  this->CatheterAngle +=
-    std::clamp(input.catheterAngle - this->CatheterAngle, -2.0 * this->Step, 2.0 * this->Step);
+  const double moved = std::clamp(allowed - this->Room.catheterTip, -mostTip, mostTip);
+  this->Room.catheterTip += moved;
+  // A guide that is brought to the ostium takes the wires along: the valve at its end holds them.
+  for (std::size_t n = 0; n < this->Wires.size() && this->Free; ++n)
+  {
+    this->Wires[n]->Carry(moved);
+  }
+  this->Room.catheterAngle +=
+    std::clamp(input.catheterAngle - this->Room.catheterAngle, -2.0 * this->Step, 2.0 * this->Step);
   if (this->Free)
   {
-    this->Free->Step(this->CatheterTip - this->Settings.engagement, this->CatheterAngle, this->Wire,
-      this->Fed - this->CatheterTip, this->Thrust());
-  }
-}
-
-double Intervention::Internals::Thrust() const
-{
-  // Of the joint next to the tip, along it.
-  std::int64_t i = 0;
-  while (i + 2 < this->Rod->Size() && this->Places[i + 1] < this->Fed - this->CatheterTip)
-  {
-    ++i;
-  }
-  return -this->Rod->JointForce(i).dot(this->Rod->Axis(i));
-}
-
-void Intervention::Internals::Feed()
-{
-  const double torque = this->Behind.Stiffness() * this->Rod->Lag(this->Rod->Size() - 1);
-  const double datum = this->CatheterTip - this->Settings.insideCatheter;
-  const double minimum = datum + this->Places[MinimumSegments - 1];
-  if (this->Fed < minimum)
-  {
-    this->Say(Notice::WireAtTip);
-    this->Fed = minimum;
-  }
-  const double most = datum + this->Places[this->Settings.capacity - 1];
-  if (this->Fed > most)
-  {
-    this->Say(Notice::WireAtEnd);
-    this->Fed = most;
-  }
-  this->DriveBehind();
-  while (this->Fed - this->Places[this->Rod->Size() - 1] > datum &&
-    this->Rod->Size() < this->Settings.capacity)
-  {
-    this->Rod->Release(this->Rod->Size() - 1);
-    this->AppendSegment();
-  }
-  while (
-    this->Rod->Size() > MinimumSegments && this->Fed - this->Places[this->Rod->Size() - 2] < datum)
-  {
-    this->Rod->RemoveLast();
-  }
-  const std::int64_t last = this->Rod->Size() - 1;
-  const PathPlace place = this->Path->At(this->Fed - this->Places[last]);
-  this->Rod->Prescribe(last, place.position, this->HeldOrientation(place));
-  this->Rod->HangOnSpring(last, this->Behind.Stiffness(), torque / this->Behind.Stiffness());
-}
-
-/// The wire behind the rod, within the guide: what the rod's end hangs on.
-void Intervention::Internals::DriveBehind()
-{
-  const double tip = this->CatheterTip - this->LastCatheterTip;
-  this->Behind.Drive(this->Fed - this->CatheterTip, this->Fed - this->LastFed - tip,
-    this->HandAngle, this->CatheterAngle - this->LastCatheterAngle);
-  this->LastFed = this->Fed;
-  this->LastCatheterTip = this->CatheterTip;
-  this->LastCatheterAngle = this->CatheterAngle;
-}
-
-void Intervention::Internals::PutBack()
-{
-  // A sample whose centre is outside of the lumen: its segment is moved in. Rare; counted and told.
-  for (const RodContact& contact : this->Rod->Contacts())
-  {
-    const std::int64_t i = contact.segment;
-    const double radius = this->Segments[i].radius;
-    const std::int64_t index = i * this->Rod->SamplesPerSegment() + contact.sample;
-    if (contact.gap > -0.9 * radius || !this->InVessel[index] || i + 1 == this->Rod->Size())
+    this->InGuide.clear();
+    double thrust = 0.0;
+    for (const std::unique_ptr<DrivenWire>& wire : this->Wires)
     {
-      continue;
+      this->InGuide.emplace_back(&wire->Device(), wire->Beyond());
+      thrust += wire->Thrust();
     }
-    ContactSample sample;
-    sample.index = index;
-    sample.centre = this->Rod->SamplePoint(i, contact.sample);
-    sample.radius = radius;
-    WallPlace place;
-    Vector3 velocity = Vector3::Zero();
-    if (this->Lumen->Outside(sample, place, velocity))
-    {
-      const Vector3 inward = place.point - sample.centre;
-      const double distance = inward.norm();
-      const Vector3 move = distance > 1e-9
-        ? Vector3(inward * ((distance + 0.5 * radius) / distance))
-        : Vector3::Zero();
-      this->Rod->Place(i, this->Rod->Position(i) + move, this->Rod->Orientation(i));
-      this->Rod->SetVelocity(i, velocity, Vector3::Zero());
-      ++this->Report.outside;
-      this->Say(Notice::PutBack);
-    }
+    this->Free->Step(this->Room.catheterTip - this->Room.settings.engagement,
+      this->Room.catheterAngle, this->InGuide, thrust);
   }
 }
 
-void Intervention::Internals::KeepSane()
+void Intervention::Internals::StepWires()
 {
-  this->Last.position.clear();
-  this->Last.orientation.clear();
-  for (std::int64_t i = 0; i < this->Rod->Size(); ++i)
+  this->Report.outside = 0;
+  for (const std::unique_ptr<DrivenWire>& wire : this->Wires)
   {
-    this->Last.position.push_back(this->Rod->Position(i));
-    this->Last.orientation.push_back(this->Rod->Orientation(i));
+    wire->Step(this->Step);
+    this->Report.outside += wire->PutBackNow();
   }
-  this->Last.fed = this->Fed;
-  this->Last.angle = this->EndAngle();
-}
-
-void Intervention::Internals::Reset()
-{
-  this->Say(Notice::Reset);
-  this->Fed = this->LastFed = this->Last.fed;
-  this->Behind.Rest(this->HandAngle, this->Last.angle);
-  this->DriveBehind();
-  const std::int64_t count = static_cast<std::int64_t>(this->Last.position.size());
-  while (this->Rod->Size() > count)
-  {
-    this->Rod->RemoveLast();
-  }
-  while (this->Rod->Size() < count)
-  {
-    this->Rod->Release(this->Rod->Size() - 1);
-    this->AppendSegment();
-  }
-  for (std::int64_t i = 0; i < count; ++i)
-  {
-    this->Rod->Place(i, this->Last.position[i], this->Last.orientation[i]);
-  }
-  this->Rod->HangOnSpring(
-    count - 1, this->Behind.Stiffness(), this->Behind.Angle() - this->Last.angle);
 }
 
 void Intervention::Internals::Measure()
 {
-  const RodStep& step = this->Rod->LastStep();
   TickReport& report = this->Report;
-  report.tick = this->Tick;
+  report.tick = this->Room.tick;
   report.phase = Modulo(this->Phase);
-  report.inserted = std::max(0.0, this->Fed - this->CatheterTip);
-  report.catheterTip = this->CatheterTip;
+  report.catheterTip = this->Room.catheterTip;
   if (this->Free)
   {
     report.seat = this->Free->Seat();
     report.catheterTip = report.seat.engaged
       ? std::max(0.0, report.seat.depth + this->Free->MouthPlace())
-      : -(this->Path->At(this->CatheterTip).position - this->Free->Mouth().position).norm();
+      : -(this->Room.path->At(this->Room.catheterTip).position - this->Free->Mouth().position)
+           .norm();
   }
-  report.jointGap = step.maximumGap;
-  report.tipForce = 0.0;
-  report.maximumForce = 0.0;
-  report.contacts = 0;
-  report.maximumPenetration = 0.0;
-  report.meanPenetration = 0.0;
-  for (const RodContact& contact : this->Rod->Contacts())
+  report.hand = this->InHand;
+  for (std::size_t n = 0; n < this->Wires.size(); ++n)
   {
-    const std::int64_t index = contact.segment * this->Rod->SamplesPerSegment() + contact.sample;
-    // An open balloon's force on the wall is that of its balance.
-    if (!this->InVessel[index] ||
-      (this->Sleeve && this->Sleeve->Opened(this->BehindSleeve(contact.segment))))
-    {
-      continue;
-    }
-    const double force = std::hypot(contact.force, contact.friction.norm());
-    const double depth = std::max(0.0, -contact.gap);
-    ++report.contacts;
-    report.maximumForce = std::max(report.maximumForce, force);
-    report.maximumPenetration = std::max(report.maximumPenetration, depth);
-    report.meanPenetration += depth;
-    if (this->Places[contact.segment] < 3.0 && !this->Plugs.Holds(contact))
-    {
-      report.tipForce += force;
-    }
+    report.wires[n] = this->Wires[n]->Report();
   }
-  if (report.contacts > 0)
-  {
-    report.meanPenetration /= report.contacts;
-  }
-
-  const std::int64_t last = this->Rod->Size() - 1;
-  Vector3 force;
-  Vector3 torque;
-  this->Rod->Reaction(last, force, torque);
-  const Vector3 forward = -this->Rod->Axis(last);
-  this->Behind.Settle(force.dot(forward), this->EndAngle());
+  this->Hand().Measure(report);
   if (this->Sleeve)
   {
-    this->Sleeve->Feel(*this->Rod, this->Rail());
+    this->Sleeve->Feel(this->Carrier().Rod(), this->Carrier().Rail());
     report.balloon = this->Sleeve->Report();
-  }
-  const HandLoad& felt = this->Behind.AtHand();
-  report.proximalForce = felt.force;
-  report.proximalTorque = felt.torque;
-  if (report.inserted <= 0.0)
-  {
-    report.branch = -1;
-  }
-  else if (this->Tick % 20 == 0)
-  {
-    ContactSample tip;
-    tip.index = this->Rod->SamplesPerSegment() - 1;
-    tip.centre = this->Rod->FirstEnd(0);
-    tip.radius = this->Segments[0].radius;
-    report.branch = this->InVessel[tip.index] ? this->Lumen->BranchAt(tip) : -1;
   }
 }
 
 Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wire,
   const GuideCatheter& catheter, const InterventionSettings& settings,
-  const std::optional<BalloonCatheter>& balloon)
+  const std::optional<BalloonCatheter>& balloon, const std::optional<Guidewire>& second)
   : Data(std::make_unique<Internals>())
 {
   settings.Validate();
@@ -858,28 +483,23 @@ Intervention::Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wi
   }
   Internals& data = *this->Data;
   data.Motion = std::move(wall);
-  data.Wire = wire;
-  data.Catheter = catheter;
-  data.Settings = settings;
-  data.Behind = WireInGuide(wire, catheter, settings.insideCatheter);
+  data.Room.catheter = catheter;
+  data.Room.settings = settings;
+  data.Room.notices = Notices(settings.tickRate);
   data.Step = 1.0 / settings.tickRate;
   data.FrameSeconds = data.Step * settings.ticksPerFrame;
   data.Phase = Modulo(settings.startPhase);
-  data.MakeSegments();
   data.Motion->Positions(data.Phase, data.NextPoints);
   data.LastPoints = data.NextPoints;
-  data.Rod = std::make_unique<CosseratRod>(settings.capacity, InstrumentRod());
-  data.Engage(data.NextPoints, data.Rod->SamplesPerSegment());
-  data.Plugs = OcclusionPlugs(data.Motion->Topology(), data.Axis);
-  data.InVessel.assign(settings.capacity * data.Rod->SamplesPerSegment(), 0);
+  data.Engage(data.NextPoints);
+  data.Room.plugs = OcclusionPlugs(data.Motion->Topology(), data.Axis);
+  data.AddWire(wire);
+  if (second)
+  {
+    second->Validate();
+    data.AddWire(*second);
+  }
   data.Line.reserve(settings.capacity + 1);
-  data.Last.position.reserve(settings.capacity);
-  data.Last.orientation.reserve(settings.capacity);
-  data.Fed = data.LastFed = data.CatheterTip - StartInside;
-  data.LastCatheterTip = data.CatheterTip;
-  data.DriveBehind();
-  data.PlaceOnPath();
-  data.KeepSane();
   if (balloon)
   {
     data.TakeBalloon(*balloon);
@@ -893,41 +513,46 @@ Intervention& Intervention::operator=(Intervention&&) noexcept = default;
 const TickReport& Intervention::Step(const DriveInput& input)
 {
   Internals& data = *this->Data;
-  if (data.TickInFrame == 0 || data.TickInFrame >= data.Settings.ticksPerFrame)
+  if (data.TickInFrame == 0 || data.TickInFrame >= data.Room.settings.ticksPerFrame)
   {
     data.BeginFrame();
   }
-  ++data.Tick;
+  ++data.Room.tick;
   ++data.TickInFrame;
-  data.Report.outside = 0;
   const double inFrame = data.Step * data.TickInFrame;
   data.Wall->SetTime(inFrame);
-  data.Path->SetTime(inFrame);
-  data.Plugs.SetTime(inFrame);
-  data.Phase += data.Step * data.Settings.heartRate / 60.0;
+  data.Room.path->SetTime(inFrame);
+  data.Room.plugs.SetTime(inFrame);
+  data.Phase += data.Step * data.Room.settings.heartRate / 60.0;
   data.Phase = Modulo(data.Phase);
   data.Drive(input);
-  data.Feed();
+  for (const std::unique_ptr<DrivenWire>& wire : data.Wires)
+  {
+    wire->Trap().SetTime(inFrame);
+    wire->Feed();
+  }
   if (data.Sleeve)
   {
     data.DriveSleeve(input);
   }
-  const RodStep& step = data.Rod->Step(data.Step, &data);
-  if (!step.finite || step.maximumGap > 5.0)
-  {
-    data.Reset();
-  }
-  else
-  {
-    data.PutBack();
-    data.Report.capForce = data.Plugs.Press(*data.Rod);
-    if (data.Tick % 200 == 0 && step.maximumGap < 0.05 && data.Report.outside == 0)
-    {
-      data.KeepSane();
-    }
-  }
+  data.StepWires();
   data.Measure();
   return data.Report;
+}
+
+std::size_t Intervention::NumberOfWires() const
+{
+  return this->Data->Wires.size();
+}
+
+bool Intervention::TakeWire(std::size_t number)
+{
+  if (number >= this->Data->Wires.size())
+  {
+    return false;
+  }
+  this->Data->InHand = number;
+  return true;
 }
 
 const TickReport& Intervention::Report() const
@@ -939,54 +564,49 @@ void Intervention::SetHeartRate(double beatsPerMinute)
 {
   if (beatsPerMinute >= 0.0 && beatsPerMinute <= 240.0)
   {
-    this->Data->Settings.heartRate = beatsPerMinute;
+    this->Data->Room.settings.heartRate = beatsPerMinute;
   }
 }
 
 std::int64_t Intervention::NumberOfSegments() const
 {
-  return this->Data->Rod->Size();
+  return this->Data->Wires[0]->Rod().Size();
 }
 
-const std::vector<Vector3>& Intervention::Centerline() const
+const std::vector<Vector3>& Intervention::Centerline(std::size_t wire) const
 {
   Internals& data = *this->Data;
-  data.Line.clear();
-  const std::int64_t count = data.Rod->Size();
-  data.Line.push_back(data.Rod->FirstEnd(0));
-  for (std::int64_t i = 0; i + 1 < count; ++i)
-  {
-    data.Line.push_back(0.5 * (data.Rod->LastEnd(i) + data.Rod->FirstEnd(i + 1)));
-  }
-  data.Line.push_back(data.Rod->LastEnd(count - 1));
+  data.Wires.at(wire)->Line(data.Line);
   return data.Line;
 }
 
 const std::vector<Vector3>& Intervention::CatheterLine() const
 {
   Internals& data = *this->Data;
-  data.Path->Line(data.CatheterTip, DrawnCatheter, data.CatheterPoints);
+  data.Room.path->Line(data.Room.catheterTip, DrawnCatheter, data.CatheterPoints);
   return data.CatheterPoints;
 }
 
 void Intervention::BalloonLine(std::vector<Vector3>& line, std::vector<double>& radii) const
 {
-  const Internals& data = *this->Data;
+  Internals& data = *this->Data;
   line.clear();
   radii.clear();
   if (!data.Sleeve)
   {
     return;
   }
-  const double tip = data.Fed - data.Sleeve->Tip(); // mm of the wire before it
+  const DrivenWire& wire = data.Carrier();
+  const CosseratRod& rod = wire.Rod();
+  const double tip = wire.Fed() - data.Sleeve->Tip(); // mm of the wire before it
   double along = 0.0;
   double wanted = tip;
-  for (std::int64_t i = 0; i < data.Rod->Size(); ++i)
+  for (std::int64_t i = 0; i < rod.Size(); ++i)
   {
-    const double length = data.Segments[i].length;
+    const double length = wire.Segments()[i].length;
     for (; wanted <= along + length; wanted += BalloonOnWire::Spacing)
     {
-      line.push_back(data.Rod->Position(i) + (wanted - along - 0.5 * length) * data.Rod->Axis(i));
+      line.push_back(rod.Position(i) + (wanted - along - 0.5 * length) * rod.Axis(i));
       radii.push_back(data.Sleeve->RadiusAt(wanted - tip));
     }
     along += length;
@@ -997,7 +617,7 @@ const std::vector<Vector3>& Intervention::WallPoints() const
 {
   Internals& data = *this->Data;
   const double share =
-    static_cast<double>(data.TickInFrame) / static_cast<double>(data.Settings.ticksPerFrame);
+    static_cast<double>(data.TickInFrame) / static_cast<double>(data.Room.settings.ticksPerFrame);
   data.NowPoints.resize(data.NextPoints.size());
   for (std::size_t i = 0; i < data.NowPoints.size(); ++i)
   {
@@ -1011,7 +631,7 @@ void Intervention::SomeWallPoints(
 {
   const Internals& data = *this->Data;
   const double share =
-    static_cast<double>(data.TickInFrame) / static_cast<double>(data.Settings.ticksPerFrame);
+    static_cast<double>(data.TickInFrame) / static_cast<double>(data.Room.settings.ticksPerFrame);
   positions.resize(which.size());
   for (std::size_t n = 0; n < which.size(); ++n)
   {
@@ -1023,20 +643,31 @@ void Intervention::SomeWallPoints(
 std::uint64_t Intervention::StateHash() const
 {
   const Internals& data = *this->Data;
-  std::uint64_t hash = data.Rod->Hash();
-  for (const double value : { data.Fed, data.HandAngle, data.CatheterTip, data.CatheterAngle,
-         data.Phase, static_cast<double>(data.Tick) })
+  const DrivenWire& first = *data.Wires[0];
+  std::uint64_t hash = first.Rod().Hash();
+  for (const double value : { first.Fed(), first.Angle(), data.Room.catheterTip,
+         data.Room.catheterAngle, data.Phase, static_cast<double>(data.Room.tick) })
   {
     hash = Fnv1a(&value, sizeof(value), hash);
   }
-  hash = data.Plugs.Hash(data.Behind.Hash(hash));
+  hash = data.Room.plugs.Hash(first.Hash(hash));
   hash = data.Free ? data.Free->Hash(hash) : hash;
+  for (std::size_t n = 1; n < data.Wires.size(); ++n)
+  {
+    const DrivenWire& wire = *data.Wires[n];
+    for (const double value : { wire.Fed(), wire.Angle(), static_cast<double>(data.InHand == n),
+           static_cast<double>(data.SleeveWire == n) })
+    {
+      hash = Fnv1a(&value, sizeof(value), hash);
+    }
+    hash = wire.Hash(wire.Rod().Hash(hash));
+  }
   return data.Sleeve ? data.Opening->Hash(data.Sleeve->Hash(hash)) : hash;
 }
 
 const GuideCatheter& Intervention::Catheter() const
 {
-  return this->Data->Catheter;
+  return this->Data->Room.catheter;
 }
 
 std::pair<std::int64_t, std::int64_t> Intervention::GuideCovers() const
@@ -1065,6 +696,11 @@ const BalloonOnWire* Intervention::Balloon() const
 const DilatableWall* Intervention::Dilated() const
 {
   return this->Data->Opening.get();
+}
+
+const std::vector<BranchMouth>& Intervention::Mouths() const
+{
+  return this->Data->Mouths.All();
 }
 
 const std::vector<PlacedStent>& Intervention::Stents() const
@@ -1123,14 +759,16 @@ bool Intervention::Exchange(const BalloonCatheter& balloon)
   {
     throw std::logic_error("there is no balloon in this session that could be exchanged");
   }
-  RequireFit(balloon, data.Catheter);
-  if (data.Sleeve->Tip() > data.SleeveStart + ParkedWithin ||
-    data.Sleeve->Report().pressure > Emptied)
+  data.RequireFitting(balloon);
+  if (!data.SleeveIsParked() || data.Sleeve->Report().pressure > Emptied)
   {
     data.Say(Notice::NotExchanged);
     return false;
   }
-  data.Sleeve = std::make_unique<BalloonOnWire>(balloon, data.Catheter, data.SleeveStart);
+  data.Carrier().SetSleeve(nullptr);
+  data.Sleeve = std::make_unique<BalloonOnWire>(balloon, data.Room.catheter, data.SleeveStart);
+  data.SleeveWire = data.InHand;
+  data.Carrier().SetSleeve(data.Sleeve.get());
   data.Inflator = 0.0;
   data.Report.balloon = data.Sleeve->Report();
   return true;
@@ -1139,38 +777,28 @@ bool Intervention::Exchange(const BalloonCatheter& balloon)
 bool Intervention::Exchange(const Guidewire& wire)
 {
   Internals& data = *this->Data;
-  RequireFit(wire, data.Catheter);
-  if (data.Fed > data.CatheterTip)
+  RequireFit(wire, data.Room.catheter);
+  if (data.Hand().Beyond() > 0.0)
   {
     data.Say(Notice::WireNotExchanged);
     return false;
   }
-  data.Wire = wire;
-  data.MakeSegments();
-  data.Behind = WireInGuide(wire, data.Catheter, data.Settings.insideCatheter);
-  data.DriveBehind(); // how stiff it is, for how it rests
-  data.Behind.Rest(data.HandAngle, data.HandAngle);
-  data.DriveBehind();
-  *data.Rod = CosseratRod(data.Settings.capacity, InstrumentRod());
-  data.PlaceOnPath();
-  data.KeepSane();
+  data.Hand().Take(wire);
   return true;
 }
 
-const Guidewire& Intervention::Wire() const
+const Guidewire& Intervention::Wire(std::size_t number) const
 {
-  return this->Data->Wire;
+  return this->Data->Wires.at(number)->Device();
 }
 
 const std::vector<OcclusionPlug>& Intervention::Plugs() const
 {
-  return this->Data->Plugs.All();
+  return this->Data->Room.plugs.All();
 }
 
 std::vector<std::string> Intervention::TakeMessages()
 {
-  std::vector<std::string> taken;
-  taken.swap(this->Data->Messages);
-  return taken;
+  return this->Data->Room.notices.Take();
 }
 }

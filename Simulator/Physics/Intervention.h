@@ -6,12 +6,14 @@
 #define DynamicCoronary_Intervention_h
 
 #include "BalloonOnWire.h"
+#include "BranchMouths.h"
 #include "DriveInput.h"
 #include "Geometry.h"
 #include "GuideInAorta.h"
 #include "Instrument.h"
 #include "OcclusionPlug.h"
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -44,14 +46,28 @@ struct InterventionSettings
   double drag = 2.5;
   double maximumSpeed = 300.0; ///< mm/s by which hands can advance; more is clamped, with a message
   double maximumTurning = 30.0; ///< rad/s, likewise
+  bool branchesAnswer = true;   ///< what opens a vessel narrows the mouths of its side branches
 
   /// @throws std::invalid_argument naming the setting
   void Validate() const;
 };
 
-/// Of one tick.
+/// A wire, of one tick.
+struct WireReport
+{
+  double inserted = 0.0; ///< mm beyond the catheter's tip
+  int branch = -1;       ///< group of the wall next to its tip; -1 in the catheter
+  double force = 0.0;    ///< N at its hand, against advancing
+  bool jailed = false;   ///< a stent was opened while it lay beside it, and it still does
+  double held = 0.0;     ///< mm of it between the wall and a stent or balloon
+  double grip = 0.0;     ///< N of friction there
+};
+
+/// Of one tick. What is said of a wire is of the one in hand.
 struct TickReport
 {
+  static constexpr std::size_t MostWires = 2;
+
   std::uint64_t tick = 0;
   double phase = 0.0;    ///< fraction of the R-R interval, 0 to 1
   double inserted = 0.0; ///< mm of the wire beyond the catheter's tip
@@ -70,6 +86,8 @@ struct TickReport
   int outside = 0; ///< samples whose centre was outside of the lumen and was put back
   int branch = -1; ///< group of the wall next to the wire's tip; -1 in the catheter
   BalloonReport balloon;
+  std::array<WireReport, MostWires> wires;
+  std::size_t hand = 0; ///< number of the wire in hand
 };
 
 /// A stent as it lies now.
@@ -88,10 +106,12 @@ class Intervention
 {
 public:
   /// @throws std::invalid_argument naming what is wrong: instruments, settings, an instrument that does not fit
-  /// into the vessel or the other one
+  /// into the vessel or the other ones
+  /// @param second  another wire in the same guide; no hand is on it until it is taken
   Intervention(std::shared_ptr<WallMotion> wall, const Guidewire& wire,
     const GuideCatheter& catheter, const InterventionSettings& settings = {},
-    const std::optional<BalloonCatheter>& balloon = {});
+    const std::optional<BalloonCatheter>& balloon = {},
+    const std::optional<Guidewire>& second = {});
   ~Intervention();
   Intervention(Intervention&&) noexcept;
   Intervention& operator=(Intervention&&) noexcept;
@@ -103,9 +123,14 @@ public:
 
   void SetHeartRate(double beatsPerMinute); ///< 0: the heart stands still
 
-  std::int64_t NumberOfSegments() const; ///< simulated now
-  /// Ends of the simulated segments from the tip (first) to inside the catheter, one more than segments, mm.
-  const std::vector<Vector3>& Centerline() const;
+  std::size_t NumberOfWires() const;
+  /// From the next step on the hand drives this wire; the other one is held where it is.
+  /// @return false: there is none
+  bool TakeWire(std::size_t number);
+
+  std::int64_t NumberOfSegments() const; ///< of the first wire that are simulated now
+  /// Ends of a wire's simulated segments from the tip (first) to inside the catheter, one more than segments, mm.
+  const std::vector<Vector3>& Centerline(std::size_t wire = 0) const;
   /// The catheter from its tip back, mm.
   const std::vector<Vector3>& CatheterLine() const;
   /// The balloon catheter from its tip to where the simulated wire ends, and its radii; empty without, or in the guide.
@@ -124,22 +149,24 @@ public:
   const BalloonOnWire* Balloon() const;
   /// What the balloon opens; null without.
   const DilatableWall* Dilated() const;
+  /// Mouths of side branches beside what was opened; empty without a balloon.
+  const std::vector<BranchMouth>& Mouths() const;
   /// Stents that are left in the wall, in the order in which they were.
   const std::vector<PlacedStent>& Stents() const;
   /// These as they lie now, and last the one that is on the balloon.
   void StentShapes(std::vector<StentShape>& shapes) const;
 
   /**
-   * Another balloon catheter in place of this one, before the next step.
+   * Another balloon catheter in place of this one, on the wire in hand, before the next step.
    * @return false: this one is not wholly in the guide and empty; a message says so
    * @throws as RequireFit; std::logic_error: there is no balloon in this session
    */
   bool Exchange(const BalloonCatheter& balloon);
-  /// Another wire in place of this one, likewise, its tip where this one's was: both turned as the hand is, and at rest.
+  /// Another wire in place of the one in hand, its tip where this one's was: both turned as the hand is, and at rest.
   /// @return false: this one is not wholly in the guide; a message says so
   bool Exchange(const Guidewire& wire);
 
-  const Guidewire& Wire() const;
+  const Guidewire& Wire(std::size_t number = 0) const;
   /// Tissue that fills vessels, and how far it was crossed.
   const std::vector<OcclusionPlug>& Plugs() const;
 

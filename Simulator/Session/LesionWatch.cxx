@@ -14,6 +14,8 @@ constexpr double ThinnestGraded = 0.75; // mm, radius without the lesion, as in 
 constexpr double Relaxed = 0.5;         // atm: what is below is another inflation
 constexpr double SpringBack = 0.1;      // s after which a stent is judged
 constexpr double LongestChange = 0.5;   // s without another look at the flow
+constexpr double ClosedMouth = 0.02;    // mm that blood has of a branch that is closed
+constexpr double StentBears = 0.5;      // N along it: the weakest of three (Jikeikai 2015) shortens
 
 std::string Format(const char* text, ...)
 {
@@ -39,13 +41,15 @@ const char* NameOf(ProcedureEvent::Kind kind, const char*& quantity)
     { "under_expansion", "area_over_reference" }, { "malapposition", "gap_mm" },
     { "geographic_miss", "disease_mm" }, { "beyond_vessel", "stent_mm" },
     { "ischaemia", "share_without_blood" }, { "vasospasm", "narrowing" },
-    { "air_embolism", "air_mL" } };
+    { "air_embolism", "air_mL" }, { "side_branch_closed", "carina_shift" },
+    { "jailed_wire_pulled", "N" } };
   const auto& [name, value] = names[static_cast<int>(kind)];
   quantity = value;
   return name;
 }
 
-LesionWatch::LesionWatch(const WallTopology& topology, const ContrastModel& medium)
+LesionWatch::LesionWatch(
+  const WallTopology& topology, const ContrastModel& medium, const std::vector<BranchMouth>& mouths)
   : Reference(ReferenceRadii(topology))
   , Closed(ClosedRadii(topology))
   , Names(topology.groupName)
@@ -88,7 +92,48 @@ LesionWatch::LesionWatch(const WallTopology& topology, const ContrastModel& medi
     one.lesion = std::move(lesion);
     this->Lesions.push_back(std::move(one));
   }
+  for (std::size_t n = 0; n < mouths.size(); ++n)
+  {
+    this->WatchMouth(mouths[n], n, topology);
+  }
   this->Reserve = this->ReserveBefore = medium.FlowModel().FlowReserves(this->Distal);
+}
+
+void LesionWatch::WatchMouth(
+  const BranchMouth& mouth, std::size_t number, const WallTopology& topology)
+{
+  for (WatchedMouth& one : this->Branches)
+  {
+    if (one.result.branch == mouth.branch)
+    {
+      one.numbers.push_back(number);
+      return;
+    }
+  }
+  const std::int64_t last = mouth.own.back().first;
+  const std::int64_t k = last - this->First[mouth.branch];
+  WatchedMouth one;
+  one.result.reference = 2.0 * this->Reference[mouth.branch][k];
+  if (one.result.reference < 2.0 * ThinnestGraded)
+  {
+    return;
+  }
+  one.result.branch = mouth.branch;
+  one.result.vessel = this->NameOfBranch(mouth.branch);
+  one.result.degreeBefore = mouth.degreeBefore;
+  one.at = mouth.at;
+  one.numbers.push_back(number);
+  const VesselWay way = WayThrough(topology, mouth.branch);
+  double along = 0.0; // mm of the branch
+  for (std::size_t n = 0; n < way.points.size(); ++n)
+  {
+    one.result.place = way.points[n] == mouth.at ? way.place[n] : one.result.place;
+    along = way.points[n] == last ? way.place[n] : along;
+  }
+  const auto begin = std::find(way.branch.begin(), way.branch.end(), mouth.branch);
+  const double from = way.place[static_cast<std::size_t>(begin - way.branch.begin())];
+  this->Distal.push_back({ mouth.branch, along - from });
+  this->Branches.push_back(std::move(one));
 }
 
 int LesionWatch::BranchOf(std::int64_t point) const
@@ -105,14 +150,14 @@ void LesionWatch::StepFlow(double seconds, const Intervention& instruments,
   const auto [guideFirst, guideCount] = instruments.GuideCovers();
   if (wall || guideCount > 0 || incidents.Any() || !this->Filled_.empty())
   {
-    std::vector<double> narrowed;
-    if (incidents.Any())
+    std::vector<double> lumen = wall ? wall->Radii() : this->Resting;
+    for (const BranchMouth& mouth : instruments.Mouths())
     {
-      narrowed = wall ? wall->Radii() : this->Resting;
+      for (std::size_t n = 0; n < mouth.own.size() && mouth.closed; ++n)
+      {
+        lumen[mouth.own[n].first] = std::min(lumen[mouth.own[n].first], ClosedMouth);
+      }
     }
-    const std::vector<double>& lumen = incidents.Any() ? narrowed
-      : wall                                           ? wall->Radii()
-                                                       : this->Resting;
     std::vector<double> filled(lumen.size(), 0.0);
     if (wall)
     {
@@ -127,21 +172,22 @@ void LesionWatch::StepFlow(double seconds, const Intervention& instruments,
     }
     if (incidents.Any())
     {
-      incidents.Apply(narrowed, filled);
+      incidents.Apply(lumen, filled);
     }
     if (filled != this->Filled_ || lumen != this->Lumen_)
     {
       this->Filled_ = std::move(filled);
-      this->Lumen_ = lumen;
+      this->Lumen_ = std::move(lumen);
       medium.SetLumen(this->Lumen_, this->Filled_);
       this->ReserveIsOld = true;
+      this->ReserveAsked.clear();
       this->ChangesFor += seconds;
       this->FlowIsNew_ = this->ChangesFor >= LongestChange;
     }
     else if (this->ReserveIsOld)
     {
       // A network to be solved until it rests: not while a balloon moves or fills.
-      this->Reserve = medium.FlowModel().FlowReserves(this->Distal);
+      this->Reserve = this->ReserveNow(medium);
       this->ReserveIsOld = false;
       this->FlowIsNew_ = true;
     }
@@ -249,6 +295,7 @@ void LesionWatch::StepTick(double seconds, const Intervention& instruments,
   this->Stretched = report.stretch > tearing || (this->Stretched && open);
   this->Pressed = report.pressure > balloon.ratedPressure || (this->Pressed && open);
   this->Overwide = report.ringStretch > 1.0 || (this->Overwide && open);
+  this->StepMouths(seconds, instruments, said);
   for (Watched& one : this->Lesions)
   {
     const std::vector<std::int64_t>& points = one.lesion.points;
@@ -262,6 +309,7 @@ void LesionWatch::StepTick(double seconds, const Intervention& instruments,
   {
     return;
   }
+  this->StepJail(seconds, instruments, said);
   if (open)
   {
     this->LastHeld = seconds;
@@ -276,6 +324,67 @@ void LesionWatch::StepTick(double seconds, const Intervention& instruments,
     {
       this->Judge(seconds, stents[n], this->Judgements[n], said);
     }
+  }
+}
+
+void LesionWatch::StepMouths(
+  double seconds, const Intervention& instruments, std::vector<std::string>& said)
+{
+  for (WatchedMouth& one : this->Branches)
+  {
+    bool closed = false;
+    double shift = 0.0;
+    for (const std::size_t number : one.numbers)
+    {
+      const BranchMouth& mouth = instruments.Mouths()[number];
+      closed = closed || mouth.closed;
+      shift = std::max(shift, mouth.shift);
+    }
+    if (closed == one.toldClosed)
+    {
+      continue;
+    }
+    one.toldClosed = closed;
+    const char* name = one.result.vessel.c_str();
+    if (closed)
+    {
+      this->Events_.push_back({ ProcedureEvent::Kind::SideBranchClosed, seconds, one.result.branch,
+        shift, one.result.place });
+    }
+    said.push_back(closed
+        ? Format("The side branch %s is closed: carina and plaque were shifted over its mouth, and "
+                 "no wire is in it. It leaves %.1f mm from the ostium.",
+            name, one.result.place)
+        : Format("The side branch %s is open again.", name));
+  }
+}
+
+void LesionWatch::StepJail(
+  double seconds, const Intervention& instruments, std::vector<std::string>& said)
+{
+  static const char* const names[TickReport::MostWires] = { "first", "second" };
+  const TickReport& report = instruments.Report();
+  for (std::size_t n = 0; n < instruments.NumberOfWires(); ++n)
+  {
+    const WireReport& wire = report.wires[n];
+    if (wire.jailed != this->Jailed[n])
+    {
+      this->Jailed[n] = wire.jailed;
+      said.push_back(wire.jailed
+          ? Format("The %s wire is jailed between the stent and the wall.", names[n])
+          : Format("The %s wire is free of the stent.", names[n]));
+    }
+    const bool hard = n == report.hand && wire.jailed && wire.grip > StentBears;
+    if (hard && !this->PulledHard[n])
+    {
+      this->Tell({ ProcedureEvent::Kind::JailedWirePulled, seconds, -1, wire.grip,
+                   instruments.Stents().back().middle },
+        instruments.Stents().back().points.front(),
+        Format("The jailed %s wire is pulled with %.2f N: the stent may be shortened.", names[n],
+          wire.grip),
+        said);
+    }
+    this->PulledHard[n] = hard || (this->PulledHard[n] && wire.jailed);
   }
 }
 
@@ -380,12 +489,45 @@ std::vector<StentResult> LesionWatch::Stents(const Intervention& instruments) co
   return results;
 }
 
+const std::vector<double>& LesionWatch::ReserveNow(const ContrastModel& medium) const
+{
+  if (!this->ReserveIsOld)
+  {
+    return this->Reserve;
+  }
+  if (this->ReserveAsked.empty())
+  {
+    this->ReserveAsked = medium.FlowModel().FlowReserves(this->Distal);
+  }
+  return this->ReserveAsked;
+}
+
+std::vector<MouthResult> LesionWatch::Mouths(
+  const Intervention& instruments, const ContrastModel& medium) const
+{
+  const std::vector<double>& reserve = this->ReserveNow(medium);
+  std::vector<MouthResult> results;
+  for (std::size_t n = 0; n < this->Branches.size(); ++n)
+  {
+    MouthResult result = this->Branches[n].result;
+    for (const std::size_t number : this->Branches[n].numbers)
+    {
+      const BranchMouth& mouth = instruments.Mouths()[number];
+      result.degree = std::max(result.degree, mouth.degree);
+      result.closed = result.closed || mouth.closed;
+    }
+    result.reserveBefore = this->ReserveBefore[this->Lesions.size() + n];
+    result.reserve = reserve[this->Lesions.size() + n];
+    results.push_back(std::move(result));
+  }
+  return results;
+}
+
 std::vector<LesionResult> LesionWatch::Results(
   const Intervention& instruments, const ContrastModel& medium) const
 {
   const DilatableWall* wall = instruments.Dilated();
-  const std::vector<double> reserve =
-    this->ReserveIsOld ? medium.FlowModel().FlowReserves(this->Distal) : this->Reserve;
+  const std::vector<double>& reserve = this->ReserveNow(medium);
   std::vector<LesionResult> results;
   for (std::size_t n = 0; n < this->Lesions.size(); ++n)
   {

@@ -13,6 +13,7 @@
 #include "VesselIncidents.h"
 #include "VesselLesions.h"
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,20 @@ struct LesionResult
   bool holdsBalloon = false; ///< the balloon's middle is in it
 };
 
+/// The mouth of a side branch.
+struct MouthResult
+{
+  std::string vessel;
+  int branch = 0;
+  double reference = 0.0;     ///< mm, diameter of the branch
+  double place = 0.0;         ///< mm from the ostium
+  double degreeBefore = 0.0;  ///< of the diameter, when the session began
+  double degree = 0.0;        ///< now; 1: closed
+  bool closed = false;        ///< no blood comes in, though the branch was open
+  double reserveBefore = 0.0; ///< FFR behind it when the session began
+  double reserve = 0.0;       ///< FFR now
+};
+
 /// Something that a report has to name.
 struct ProcedureEvent
 {
@@ -49,7 +64,9 @@ struct ProcedureEvent
     BeyondVessel,       ///< value: mm of the stent without a vessel around
     Ischaemia,          ///< the ST segment is up; value: share of the heart without blood
     Spasm,              ///< value: narrowing of the diameter
-    Air                 ///< in an artery; value: mL
+    Air,                ///< in an artery; value: mL
+    SideBranchClosed, ///< what was opened beside it closed it; value: how far the carina is over its mouth
+    JailedWirePulled ///< beyond what stents bear along; value: N
   };
   Kind kind = Kind::OverExpansion;
   double seconds = 0.0;
@@ -64,7 +81,9 @@ const char* NameOf(ProcedureEvent::Kind kind, const char*& quantity);
 class LesionWatch
 {
 public:
-  explicit LesionWatch(const WallTopology& topology, const ContrastModel& medium);
+  /// @param mouths  of side branches that are watched, too
+  LesionWatch(const WallTopology& topology, const ContrastModel& medium,
+    const std::vector<BranchMouth>& mouths = {});
 
   /// A step of the flow: the lumen as it is now, and what lies in it, goes into the network.
   void StepFlow(double seconds, const Intervention& instruments, const VesselIncidents& incidents,
@@ -82,6 +101,9 @@ public:
 
   bool Empty() const { return this->Lesions.empty(); }
   std::vector<LesionResult> Results(
+    const Intervention& instruments, const ContrastModel& medium) const;
+  /// Of side branches that are not thin.
+  std::vector<MouthResult> Mouths(
     const Intervention& instruments, const ContrastModel& medium) const;
   /// Of the stents in the wall.
   std::vector<StentResult> Stents(const Intervention& instruments) const;
@@ -117,7 +139,19 @@ private:
     bool missed = false;
     bool beyond = false;
   };
+  /// Of a side branch, all its mouths.
+  struct WatchedMouth
+  {
+    MouthResult result;
+    std::int64_t at = -1;             ///< point of the axes
+    std::vector<std::size_t> numbers; ///< in Intervention::Mouths
+    bool toldClosed = false;
+  };
+  const std::vector<double>& ReserveNow(const ContrastModel& medium) const;
   int BranchOf(std::int64_t point) const;
+  void WatchMouth(const BranchMouth& mouth, std::size_t number, const WallTopology& topology);
+  void StepMouths(double seconds, const Intervention& instruments, std::vector<std::string>& said);
+  void StepJail(double seconds, const Intervention& instruments, std::vector<std::string>& said);
   std::string NameOfBranch(int branch) const;
   std::string NameAt(std::int64_t point) const;
   void Tell(ProcedureEvent event, std::int64_t point, const std::string& text,
@@ -126,11 +160,14 @@ private:
     double seconds, const StentResult& stent, Judged& before, std::vector<std::string>& said);
 
   std::vector<Watched> Lesions;
-  std::vector<CatheterTip> Distal; ///< place behind each lesion
+  std::vector<WatchedMouth> Branches;
+  std::vector<CatheterTip> Distal; ///< place behind each lesion, and then each mouth
   std::vector<double> ReserveBefore;
   std::vector<double> Reserve; ///< of the lumen when it last stayed for a step
   bool ReserveIsOld = false;   ///< the lumen has changed since
-  double ChangesFor = 0.0;     ///< s
+  mutable std::vector<double>
+    ReserveAsked;          ///< of the lumen now, when it is old; empty: nobody asked
+  double ChangesFor = 0.0; ///< s
   bool FlowIsNew_ = false;
   std::vector<std::int64_t> First;            ///< point of each branch
   std::vector<std::vector<double>> Reference; ///< mm, radii
@@ -145,6 +182,8 @@ private:
   bool Stretched = false;
   bool Pressed = false;
   bool Overwide = false;
+  std::array<bool, TickReport::MostWires> Jailed{}; ///< wires that were told of
+  std::array<bool, TickReport::MostWires> PulledHard{};
   double LastHeld = 0.0; ///< s, when a balloon was open last
   bool ToJudge = false;
 };

@@ -28,7 +28,8 @@ bool IsOfLesion(Goal goal)
 
 bool NeedsBalloon(Goal goal)
 {
-  return goal == Goal::BalloonInLesion || goal == Goal::StentInLesion;
+  return goal == Goal::BalloonInLesion || goal == Goal::StentInLesion ||
+    goal == Goal::SideBranchOpen;
 }
 
 /// The step's lesion among the session's.
@@ -59,7 +60,8 @@ double Counted(const SessionMetrics& metrics, ProcedureEvent::Kind kind)
 }
 
 ProcedureWatch::ProcedureWatch(const std::vector<ProcedureStep>& steps,
-  const WallTopology& topology, const std::vector<LesionResult>& lesions, bool hasBalloon)
+  const WallTopology& topology, const std::vector<LesionResult>& lesions, bool hasBalloon,
+  const std::vector<MouthResult>& mouths)
   : Steps(steps)
   , Parent(topology.parent)
   , Names(topology.groupName)
@@ -78,12 +80,37 @@ ProcedureWatch::ProcedureWatch(const std::vector<ProcedureStep>& steps,
       throw std::invalid_argument("The procedure's step '" + step.text +
         "' needs a vessel that is not there: '" + step.vessel + "'.");
     }
+    if (step.goal == Goal::SideBranchOpen &&
+      std::none_of(mouths.begin(), mouths.end(),
+        [&](const MouthResult& mouth) { return mouth.vessel == step.vessel; }))
+    {
+      std::string names;
+      for (const MouthResult& mouth : mouths)
+      {
+        names += (names.empty() ? "" : ", ") + mouth.vessel;
+      }
+      throw std::invalid_argument("The procedure's step '" + step.text +
+        "' needs a side branch of 1.5 mm or more that is not there: '" + step.vessel +
+        "'; there are " + (names.empty() ? "none" : names) + ".");
+    }
   }
 }
 
 bool ProcedureWatch::NeedsLesions() const
 {
-  return !this->Done() && IsOfLesion(this->Steps[this->State_.reached.size()].goal);
+  const std::size_t n = this->State_.reached.size();
+  return n < this->Steps.size() &&
+    (IsOfLesion(this->Steps[n].goal) || this->Steps[n].goal == Goal::SideBranchOpen);
+}
+
+/// In the vessel or behind it.
+bool ProcedureWatch::IsIn(int branch, const std::string& vessel) const
+{
+  while (branch >= 0 && this->Names[static_cast<std::size_t>(branch)] != vessel)
+  {
+    branch = this->Parent[static_cast<std::size_t>(branch)];
+  }
+  return branch >= 0;
 }
 
 bool ProcedureWatch::IsBehind(int branch, int ancestor) const
@@ -122,7 +149,8 @@ bool ProcedureWatch::SeesView(const ProcedureMoment& moment, double views)
 }
 
 bool ProcedureWatch::Reached(const ProcedureMoment& moment,
-  const std::vector<LesionResult>& lesions, const std::vector<StentResult>& stents)
+  const std::vector<LesionResult>& lesions, const std::vector<StentResult>& stents,
+  const std::vector<MouthResult>& mouths)
 {
   const std::size_t n = this->State_.reached.size();
   const ProcedureStep& step = this->Steps[n];
@@ -136,15 +164,8 @@ bool ProcedureWatch::Reached(const ProcedureMoment& moment,
     case Goal::GuideIn:
       return report.catheterTip >= 0.0;
     case Goal::WireIn:
-      for (int branch = report.branch; branch >= 0;
-           branch = this->Parent[static_cast<std::size_t>(branch)])
-      {
-        if (this->Names[static_cast<std::size_t>(branch)] == step.vessel)
-        {
-          return true;
-        }
-      }
-      return false;
+      return this->IsIn(
+        step.wire < 0 ? report.branch : report.wires.at(step.wire).branch, step.vessel);
     case Goal::WireAtLesion:
       return this->IsBehind(lesion->branch, report.branch) &&
         report.catheterTip + report.inserted >= lesion->from - step.value;
@@ -166,15 +187,26 @@ bool ProcedureWatch::Reached(const ProcedureMoment& moment,
     case Goal::ReserveAbove:
       return !open && lesion->reserve > step.value;
     case Goal::WireBack:
-      return report.inserted < InGuide && report.balloon.place < 0;
+      if (step.wire >= 0)
+      {
+        return report.wires.at(step.wire).inserted < InGuide;
+      }
+      return report.wires[0].inserted < InGuide && report.wires[1].inserted < InGuide &&
+        report.balloon.place < 0;
+    case Goal::SideBranchOpen:
+      return !open &&
+        std::all_of(mouths.begin(), mouths.end(),
+          [&](const MouthResult& mouth)
+          { return mouth.vessel != step.vessel || (!mouth.closed && mouth.reserve > step.value); });
   }
   return false;
 }
 
 void ProcedureWatch::Step(const ProcedureMoment& moment, const std::vector<LesionResult>& lesions,
-  const std::vector<StentResult>& stents, std::vector<std::string>& said)
+  const std::vector<StentResult>& stents, std::vector<std::string>& said,
+  const std::vector<MouthResult>& mouths)
 {
-  while (!this->Done() && this->Reached(moment, lesions, stents))
+  while (!this->Done() && this->Reached(moment, lesions, stents, mouths))
   {
     const std::size_t n = this->State_.reached.size();
     this->State_.reached.push_back(moment.metrics.procedureSeconds);
@@ -182,7 +214,7 @@ void ProcedureWatch::Step(const ProcedureMoment& moment, const std::vector<Lesio
     this->RunCounts = false;
     said.push_back("Step " + std::to_string(n + 1) + " of " + std::to_string(this->Steps.size()) +
       " is done: " + this->Steps[n].text + ".");
-    if (this->NeedsLesions() && lesions.empty())
+    if (this->NeedsLesions() && lesions.empty() && mouths.empty())
     {
       return;
     }
@@ -195,7 +227,8 @@ double ScoreItem::Lost() const
 }
 
 ProcedureScore ScoreOf(const std::vector<ProcedureStep>& steps, const ProcedureState& state,
-  const SessionMetrics& metrics, const std::vector<StentResult>& stents, const TickReport& last)
+  const SessionMetrics& metrics, const std::vector<StentResult>& stents, const TickReport& last,
+  const std::vector<MouthResult>& mouths)
 {
   using Kind = ProcedureEvent::Kind;
   ProcedureScore score;
@@ -206,6 +239,13 @@ ProcedureScore ScoreOf(const std::vector<ProcedureStep>& steps, const ProcedureS
   if (last.balloon.wallPressure > 0.0)
   {
     score.failures.emplace_back("a balloon is left open in the vessel");
+  }
+  for (const MouthResult& mouth : mouths)
+  {
+    if (mouth.closed)
+    {
+      score.failures.push_back("the side branch " + mouth.vessel + " is left closed");
+    }
   }
   const auto stentsThat = [&](const auto& are)
   { return static_cast<double>(std::count_if(stents.begin(), stents.end(), are)); };
@@ -246,6 +286,9 @@ ProcedureScore ScoreOf(const std::vector<ProcedureStep>& steps, const ProcedureS
         }),
       "stents", 10.0, 20.0 },
     { "stent beyond the vessel", Counted(metrics, Kind::BeyondVessel), "times", 10.0, 10.0 },
+    { "side branch closed", Counted(metrics, Kind::SideBranchClosed), "times", 20.0, 40.0 },
+    { "jailed wire pulled with more than 0.5 N", Counted(metrics, Kind::JailedWirePulled), "times",
+      10.0, 10.0 },
   };
   for (const ScoreItem& item : score.items)
   {

@@ -42,21 +42,24 @@ class ProcedureWatch
 public:
   /// @throws std::invalid_argument  a step needs a lesion, a vessel or a balloon that the session has not
   ProcedureWatch(const std::vector<ProcedureStep>& steps, const WallTopology& topology,
-    const std::vector<LesionResult>& lesions, bool hasBalloon);
+    const std::vector<LesionResult>& lesions, bool hasBalloon,
+    const std::vector<MouthResult>& mouths = {});
 
-  /// Whether the next goal needs these.
+  /// Whether the next goal needs these, or mouths.
   bool NeedsLesions() const;
   bool Done() const { return this->State_.reached.size() == this->Steps.size(); }
 
   /// @param said  gets a sentence when a step is done
   void Step(const ProcedureMoment& moment, const std::vector<LesionResult>& lesions,
-    const std::vector<StentResult>& stents, std::vector<std::string>& said);
+    const std::vector<StentResult>& stents, std::vector<std::string>& said,
+    const std::vector<MouthResult>& mouths = {});
 
   const ProcedureState& State() const { return this->State_; }
 
 private:
   bool Reached(const ProcedureMoment& moment, const std::vector<LesionResult>& lesions,
-    const std::vector<StentResult>& stents);
+    const std::vector<StentResult>& stents, const std::vector<MouthResult>& mouths);
+  bool IsIn(int branch, const std::string& vessel) const;
   bool SeesView(const ProcedureMoment& moment, double views);
   bool IsBehind(int branch, int ancestor) const;
 
@@ -90,7 +93,8 @@ struct ProcedureScore
 };
 
 ProcedureScore ScoreOf(const std::vector<ProcedureStep>& steps, const ProcedureState& state,
-  const SessionMetrics& metrics, const std::vector<StentResult>& stents, const TickReport& last);
+  const SessionMetrics& metrics, const std::vector<StentResult>& stents, const TickReport& last,
+  const std::vector<MouthResult>& mouths = {});
 
 /// For people: the result, then what failed, then each item that lost something, with its part of the formula.
 std::vector<std::string> LinesOf(const ProcedureScore& score);

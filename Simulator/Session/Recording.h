@@ -34,8 +34,9 @@
  *   (N), greatest contact force (N); every 40 ticks
  * - 3 event: kind (1 byte), double. Kind 1: heart rate, beats a minute; 2: frames a second of
  *   fluoroscopy; 3: field of view, mm; 4: number of the balloon that is taken, 0 the scenario's
- *   first; 5: that of the wire, likewise; 6: breaths a minute, 0: the breath is held; 8: mL of saline
- *   through the guide, negative: drawn back; 9: number of the scenario's event, 0: nitrates
+ *   first; 5: that of the wire, likewise; 6: breaths a minute, 0: the breath is held; 7: which of
+ *   two wires the hand is on from now on, 0 or 1; 8: mL of saline through the guide, negative:
+ *   drawn back; 9: number of the scenario's event, 0: nitrates
  * - 4 state hash: 8 bytes, FNV-1a of the instruments' state, and of contrast medium and exposures
  *   once there have been any; every 1000 ticks and at the end
  * - 5 image hash: 8 bytes, FNV-1a of an X-ray image's size and pixels; written with `--xray`
@@ -109,6 +110,7 @@ struct RecordedEvent
     Exchange = 4,     ///< number of the balloon that is taken, as BalloonOf
     ExchangeWire = 5, ///< number of the wire that is taken, as WireOf
     Breaths = 6,      ///< a minute; 0: the breath is held where it is
+    TakeWire = 7,     ///< the hand goes to this wire: 0 the first, 1 the second
     Flush = 8,        ///< mL of saline pushed through the guide catheter; negative: drawn back
     Incident =
       9 ///< number of the scenario's event that happens now, from 1 on; 0: nitrates are given

@@ -44,7 +44,8 @@ constexpr GoalName GoalNames[] = { { ProcedureStep::Goal::Angiogram, "angiogram"
   { ProcedureStep::Goal::StenosisBelow, "stenosis_below", "percent", 1.0, 100.0 },
   { ProcedureStep::Goal::ReserveAbove, "ffr_above", "ffr", 0.0, 1.0 },
   { ProcedureStep::Goal::WireBack, "wire_back", nullptr, 0.0, 0.0 },
-  { ProcedureStep::Goal::GuideIn, "guide_in_ostium", nullptr, 0.0, 0.0 } };
+  { ProcedureStep::Goal::GuideIn, "guide_in_ostium", nullptr, 0.0, 0.0 },
+  { ProcedureStep::Goal::SideBranchOpen, "side_branch_open", "ffr", 0.0, 1.0 } };
 
 /// A number of the file, its range, and where it goes; one list for reading and writing.
 struct NumberEntry
@@ -307,6 +308,7 @@ InterventionSettings SettingsOf(const Json& object, const std::string& where)
   settings.rootBranch =
     static_cast<int>(fields.Whole("root_branch", -1, 100000, settings.rootBranch));
   settings.guideFromArch = fields.Flag("guide_from_arch", false);
+  settings.branchesAnswer = fields.Flag("side_branches_answer", true);
   fields.Done();
   try
   {
@@ -326,6 +328,7 @@ Json SettingsToJson(const InterventionSettings& given)
   json["ticks_per_frame"] = settings.ticksPerFrame;
   json["capacity"] = settings.capacity;
   json["root_branch"] = settings.rootBranch;
+  json["side_branches_answer"] = settings.branchesAnswer;
   if (settings.guideFromArch)
   {
     json["guide_from_arch"] = true;
@@ -548,7 +551,12 @@ ProcedureStep StepOf(const Json& object, const std::string& where)
     fields.Refuse("has 'goal': '" + name.substr(0, 60) + "' is none of " + list);
   }
   step.goal = goal->goal;
-  step.vessel = step.goal == ProcedureStep::Goal::WireIn ? fields.Text("vessel")
+  const bool ofWire =
+    step.goal == ProcedureStep::Goal::WireIn || step.goal == ProcedureStep::Goal::WireBack;
+  step.wire = ofWire && fields.Has("wire") ? static_cast<int>(fields.Whole("wire", 0, 1, 0)) : -1;
+  step.vessel =
+    step.goal == ProcedureStep::Goal::WireIn || step.goal == ProcedureStep::Goal::SideBranchOpen
+    ? fields.Text("vessel")
     : step.goal == ProcedureStep::Goal::Angiogram || step.goal == ProcedureStep::Goal::WireBack ||
       step.goal == ProcedureStep::Goal::GuideIn || step.goal == ProcedureStep::Goal::WireTaken
     ? ""
@@ -572,6 +580,10 @@ Json StepToJson(const ProcedureStep& step)
   if (value)
   {
     json[value] = step.value;
+  }
+  if (step.wire >= 0)
+  {
+    json["wire"] = step.wire;
   }
   return json;
 }
@@ -658,6 +670,10 @@ Scenario ScenarioFromText(
   {
     scenario.wireExchanges.push_back(wireOf(entry));
   }
+  if (fields.Has("second_wire"))
+  {
+    scenario.secondWire = wireOf(fields.Any("second_wire"));
+  }
   scenario.catheter = fields.Any("catheter").is_string()
     ? byName(
         "catheter", [&](const std::string& name) { return catalogue->Catheter(name).catheter; })
@@ -703,6 +719,10 @@ Scenario ScenarioFromText(
     {
       fields.Refuse("has a step '" + step.text + "' that takes a wire that it has not");
     }
+    if (step.wire > 0 && !scenario.secondWire)
+    {
+      fields.Refuse("has a step '" + step.text + "' for a second wire, and no 'second_wire'");
+    }
   }
   const auto part = [&](const char* name)
   { return fields.Has(name) ? fields.Object(name) : Json::object(); };
@@ -728,6 +748,10 @@ Scenario RecordedScenario(const std::string& text, const std::string& origin)
       json["imaging"].emplace(key, value);
     }
   }
+  if (json.is_object() && json.contains("settings") && json["settings"].is_object())
+  {
+    json["settings"].emplace("side_branches_answer", false);
+  }
   return ScenarioFromText(json.dump(), origin, ".");
 }
 
@@ -747,6 +771,10 @@ std::string ScenarioText(const Scenario& scenario)
   for (const Guidewire& wire : scenario.wireExchanges)
   {
     json["wire_exchanges"].push_back(WireToJson(wire));
+  }
+  if (scenario.secondWire)
+  {
+    json["second_wire"] = WireToJson(*scenario.secondWire);
   }
   if (scenario.balloon)
   {
@@ -792,7 +820,12 @@ const Guidewire* WireOf(const Scenario& scenario, std::size_t number)
   {
     return &scenario.wire;
   }
-  return number <= scenario.wireExchanges.size() ? &scenario.wireExchanges[number - 1] : nullptr;
+  if (number <= scenario.wireExchanges.size())
+  {
+    return &scenario.wireExchanges[number - 1];
+  }
+  const bool second = number == scenario.wireExchanges.size() + 1 && scenario.secondWire;
+  return second ? &*scenario.secondWire : nullptr;
 }
 
 std::vector<BuiltInScenario> BuiltInScenarios()

@@ -63,12 +63,14 @@ struct ProcedureStep
     StentInLesion,    ///< a stent is in it
     StenosisBelow,    ///< value: per cent of the diameter, without an open balloon
     ReserveAbove,     ///< value: FFR, likewise
-    WireBack          ///< wire and balloon are in the guide
+    WireBack,         ///< wires and balloon are in the guide, or `wire` is
+    SideBranchOpen    ///< value: FFR in the side branch `vessel`, without an open balloon
   };
   Goal goal = Goal::Angiogram;
   std::string text;   ///< what to do, for people
   std::string vessel; ///< of WireIn; of the lesion, else the narrowest of the session's beginning
   double value = 0.0;
+  int wire = -1; ///< of WireIn, WireBack: 0 the first, 1 the second; -1: the one in hand, all
 };
 
 /// Words of scenario files for it, and for its value. @param value  null: it has none
@@ -82,6 +84,7 @@ struct Scenario
   std::string artery = "LCA"; ///< LCA, RCA, or "any": the first root
   Guidewire wire;
   std::vector<Guidewire> wireExchanges; ///< for it, in their order
+  std::optional<Guidewire> secondWire;  ///< in the same guide
   GuideCatheter catheter;
   std::optional<BalloonCatheter> balloon; ///< none: the session has none
   std::vector<BalloonCatheter> exchanges; ///< for it, in their order; none without a balloon
@@ -110,7 +113,7 @@ Scenario RecordedScenario(const std::string& text, const std::string& origin);
 
 /// @param number  0: the session begins with it; else of its exchanges; null: there is none
 const BalloonCatheter* BalloonOf(const Scenario& scenario, std::size_t number);
-/// Likewise.
+/// Likewise; behind the exchanges comes the second wire.
 const Guidewire* WireOf(const Scenario& scenario, std::size_t number);
 
 /// JSON that says everything, the instruments' values included; reading it gives the same bits.

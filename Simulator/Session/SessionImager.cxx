@@ -361,7 +361,13 @@ void SessionImager::ProjectInstruments(
   const SessionSnapshot& snapshot, const CArmGeometry& geometry)
 {
   std::fill(this->InstrumentLayer.values.begin(), this->InstrumentLayer.values.end(), 0.0F);
-  AddInstrument(this->WireOf(snapshot), geometry, this->InstrumentLayer);
+  AddInstrument(
+    this->WireOf(snapshot, snapshot.wire, snapshot.wireNumber), geometry, this->InstrumentLayer);
+  if (!snapshot.secondWire.empty())
+  {
+    AddInstrument(this->WireOf(snapshot, snapshot.secondWire, snapshot.secondNumber), geometry,
+      this->InstrumentLayer);
+  }
   const auto addCatheter = [&](const InstrumentSegment& segment)
   {
     const std::size_t segments = std::max<std::size_t>(1, snapshot.catheter.size()) - 1;
@@ -474,12 +480,13 @@ void SessionImager::ProjectStents(const SessionSnapshot& snapshot, const CArmGeo
   }
 }
 
-InstrumentChain SessionImager::WireOf(const SessionSnapshot& snapshot) const
+InstrumentChain SessionImager::WireOf(
+  const SessionSnapshot& snapshot, const std::vector<Vector3>& line, std::size_t number) const
 {
   const double steel = this->Materials.Of(XRayMaterial::StainlessSteel);
   const double platinum = this->Materials.Of(XRayMaterial::Platinum);
   InstrumentChain wire;
-  wire.points = snapshot.wire;
+  wire.points = line;
   // Behind what is simulated it lies in the catheter.
   double inCatheter = 0.0;
   for (std::size_t n = 1; n < snapshot.catheter.size() && !wire.points.empty(); ++n)
@@ -490,7 +497,7 @@ InstrumentChain SessionImager::WireOf(const SessionSnapshot& snapshot) const
       wire.points.push_back(snapshot.catheter[n]);
     }
   }
-  const Guidewire& device = *coronary::WireOf(this->Scenario_, snapshot.wireNumber);
+  const Guidewire& device = *coronary::WireOf(this->Scenario_, number);
   double along = 0.0;
   for (std::size_t n = 0; n + 1 < wire.points.size(); ++n)
   {

@@ -103,7 +103,9 @@ public:
 private:
   CArmGeometry GeometryOf(const CArmPose& pose, double fieldOfView) const;
   void ProjectInstruments(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
-  InstrumentChain WireOf(const SessionSnapshot& snapshot) const;
+  /// @param line  from its tip on, mm  @param number  as WireOf
+  InstrumentChain WireOf(
+    const SessionSnapshot& snapshot, const std::vector<Vector3>& line, std::size_t number) const;
   void ProjectGuideLumen(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   void ProjectBalloon(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   void ProjectStents(const SessionSnapshot& snapshot, const CArmGeometry& geometry);

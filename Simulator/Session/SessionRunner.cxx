@@ -19,6 +19,10 @@ std::vector<RecordedEvent> EventsOf(const DriveScript& script, double from, doub
   {
     events.push_back({ RecordedEvent::HeartRate, heartRate });
   }
+  for (const double number : script.WiresTaken(from, to))
+  {
+    events.push_back({ RecordedEvent::TakeWire, number });
+  }
   for (const double number : script.Exchanges(from, to))
   {
     events.push_back({ RecordedEvent::Exchange, number });

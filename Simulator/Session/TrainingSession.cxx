@@ -77,9 +77,10 @@ struct TrainingSession::Internals
     : Wall(std::move(motion))
     , Settings(WithRoot(*this->Wall, scenario))
     , Imaging(scenario.imaging)
-    , Physics(this->Wall, scenario.wire, scenario.catheter, this->Settings, scenario.balloon)
+    , Physics(this->Wall, scenario.wire, scenario.catheter, this->Settings, scenario.balloon,
+        scenario.secondWire)
     , Medium(this->Wall->Topology(), scenario.contrast, scenario.seed)
-    , Watch(this->Wall->Topology(), this->Medium)
+    , Watch(this->Wall->Topology(), this->Medium, this->Physics.Mouths())
     , Incidents(this->Medium.FlowModel().Network())
     , Heart(this->Medium.FlowModel())
     , Clock(AcquisitionOf(scenario))
@@ -115,7 +116,8 @@ struct TrainingSession::Internals
     }
     this->Steps = scenario.procedure;
     this->Procedure.emplace(this->Steps, this->Wall->Topology(),
-      this->Watch.Results(this->Physics, this->Medium), scenario.balloon.has_value());
+      this->Watch.Results(this->Physics, this->Medium), scenario.balloon.has_value(),
+      this->Watch.Mouths(this->Physics, this->Medium));
     for (std::size_t n = 0; const BalloonCatheter* one = BalloonOf(scenario, n); ++n)
     {
       RequireFit(*one, scenario.catheter);
@@ -125,7 +127,12 @@ struct TrainingSession::Internals
     {
       RequireFit(*one, scenario.catheter);
       this->Wires.push_back(*one);
+      for (std::size_t k = 0; k < this->Balloons.size() && scenario.secondWire; ++k)
+      {
+        RequireFitBeside(this->Balloons[k], *one, scenario.catheter);
+      }
     }
+    this->WireNumbers = { 0, scenario.secondWire ? this->Wires.size() - 1 : 0 };
   }
 
   void SetView(const SessionInput& input);
@@ -158,6 +165,7 @@ struct TrainingSession::Internals
                                  flow.PressureAt({ this->Settings.rootBranch, tick.catheterTip }))
                              : this->Medium.AorticPressure();
   }
+  bool TakeWire(double number);
   template <typename Instrument>
   bool Exchange(
     double number, const std::vector<Instrument>& list, std::size_t& inUse, const char* what);
@@ -189,7 +197,8 @@ struct TrainingSession::Internals
   std::vector<BalloonCatheter> Balloons;
   std::size_t BalloonNumber = 0;
   std::vector<Guidewire> Wires;
-  std::size_t WireNumber = 0;
+  std::array<std::size_t, TickReport::MostWires> WireNumbers{}; // in use
+  std::size_t InHand = 0;
   ExposureClock Clock;
   std::optional<ExposureControl> Control; // none: the dose is always the same
   std::optional<std::pair<CArmPose, DetectorFormat>> Measured;
@@ -648,9 +657,10 @@ void TrainingSession::Internals::StepProcedure()
   const bool lesions = this->Procedure->NeedsLesions();
   this->Procedure->Step({ this->Report.tick, this->Metrics, this->Pose,
                           this->Clock.Radiating() && this->Clock.Last().cine, this->Clock.Runs(),
-                          this->Medium.Tracers().Injected(), this->WireNumber },
+                          this->Medium.Tracers().Injected(), this->WireNumbers[this->InHand] },
     lesions ? this->Watch.Results(this->Physics, this->Medium) : std::vector<LesionResult>(),
-    lesions ? this->Watch.Stents(this->Physics) : std::vector<StentResult>(), this->Messages);
+    lesions ? this->Watch.Stents(this->Physics) : std::vector<StentResult>(), this->Messages,
+    lesions ? this->Watch.Mouths(this->Physics, this->Medium) : std::vector<MouthResult>());
 }
 
 /// @param number  in `list`, becomes `inUse`  @return false: there is none
@@ -673,6 +683,25 @@ bool TrainingSession::Internals::Exchange(
   {
     inUse = wanted;
     this->Messages.push_back(std::string("The ") + what + " '" + list[wanted].name + "' is taken.");
+  }
+  return true;
+}
+
+/// @return false: there is no such wire
+bool TrainingSession::Internals::TakeWire(double number)
+{
+  static const char* const names[] = { "first", "second" };
+  if (number != 0.0 && (number != 1.0 || this->Physics.NumberOfWires() < 2))
+  {
+    this->Messages.emplace_back("There is no second wire in this scenario.");
+    return false;
+  }
+  const auto wanted = static_cast<std::size_t>(number);
+  if (wanted != this->InHand)
+  {
+    this->InHand = wanted;
+    this->Physics.TakeWire(wanted);
+    this->Messages.push_back(std::string("The hand is on the ") + names[wanted] + " wire.");
   }
   return true;
 }
@@ -766,7 +795,9 @@ bool TrainingSession::Apply(const RecordedEvent& event)
     case RecordedEvent::Exchange:
       return data.Exchange(event.value, data.Balloons, data.BalloonNumber, "balloon");
     case RecordedEvent::ExchangeWire:
-      return data.Exchange(event.value, data.Wires, data.WireNumber, "wire");
+      return data.Exchange(event.value, data.Wires, data.WireNumbers[data.InHand], "wire");
+    case RecordedEvent::TakeWire:
+      return data.TakeWire(event.value);
     case RecordedEvent::Flush:
       return data.Flush(event.value);
     case RecordedEvent::Incident:
@@ -814,6 +845,11 @@ std::vector<StentResult> TrainingSession::Stents() const
   return this->Data->Watch.Stents(this->Data->Physics);
 }
 
+std::vector<MouthResult> TrainingSession::Mouths() const
+{
+  return this->Data->Watch.Mouths(this->Data->Physics, this->Data->Medium);
+}
+
 const ProcedureState& TrainingSession::Procedure() const
 {
   return this->Data->Procedure->State();
@@ -822,8 +858,8 @@ const ProcedureState& TrainingSession::Procedure() const
 ProcedureScore TrainingSession::Score() const
 {
   const Internals& data = *this->Data;
-  return ScoreOf(
-    data.Steps, data.Procedure->State(), data.Metrics, this->Stents(), data.Report.tick);
+  return ScoreOf(data.Steps, data.Procedure->State(), data.Metrics, this->Stents(),
+    data.Report.tick, this->Mouths());
 }
 
 const WallTopology& TrainingSession::Topology() const
@@ -910,7 +946,12 @@ void TrainingSession::SnapshotOfImage(SessionSnapshot& snapshot) const
   snapshot.radiating = data.Clock.Radiating();
   snapshot.exposure = data.Clock.Last();
   snapshot.wire = data.Physics.Centerline();
-  snapshot.wireNumber = data.WireNumber;
+  snapshot.wireNumber = data.WireNumbers[0];
+  snapshot.secondNumber = data.WireNumbers[1];
+  if (data.Physics.NumberOfWires() > 1)
+  {
+    snapshot.secondWire = data.Physics.Centerline(1);
+  }
   snapshot.catheter = data.Physics.CatheterLine();
   snapshot.guideFromArch = data.Settings.guideFromArch;
   data.Wall->AxisPositions(data.Report.tick.phase, snapshot.axis);
@@ -929,6 +970,7 @@ void TrainingSession::SnapshotOfScene(
   this->SnapshotOfImage(snapshot);
   snapshot.lesions = this->Lesions();
   snapshot.results = this->Stents();
+  snapshot.mouths = this->Mouths();
   this->Data->Physics.SomeWallPoints(wallPoints, snapshot.wall);
   this->Data->Medium.TracerPositions(snapshot.axis, snapshot.tracers, snapshot.tracerVolumes);
 }

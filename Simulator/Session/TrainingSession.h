@@ -55,6 +55,8 @@ struct SessionSnapshot
   Exposure exposure;                   ///< the last one
   std::size_t wireNumber = 0;          ///< as WireOf
   std::vector<Vector3> wire;           ///< from its tip, mm
+  std::size_t secondNumber = 0;        ///< likewise, of the second wire
+  std::vector<Vector3> secondWire;     ///< empty: there is none
   std::vector<Vector3> catheter;       ///< from its tip, mm
   bool guideFromArch = false;          ///< it lies in the aorta, which is to be seen
   std::vector<Vector3> axis;           ///< as WallMotion::AxisPositions
@@ -75,6 +77,7 @@ struct SessionSnapshot
   ProcedureState procedure;          ///< of a scenario's steps
   std::vector<LesionResult> lesions; ///< only of SnapshotOfScene
   std::vector<StentResult> results;  ///< only of SnapshotOfScene: of the stents in the wall
+  std::vector<MouthResult> mouths;   ///< only of SnapshotOfScene: of side branches
   std::vector<Vector3> wall;         ///< only of SnapshotOfScene
   std::vector<Vector3> tracers;      ///< only of SnapshotOfScene, mm
   std::vector<float> tracerVolumes;  ///< mL of contrast medium
@@ -120,6 +123,7 @@ public:
   ContrastBalance Balance() const; ///< with what is in the guide catheter
   std::vector<LesionResult> Lesions() const;
   std::vector<StentResult> Stents() const; ///< that are in the wall
+  std::vector<MouthResult> Mouths() const; ///< of side branches that are not thin
   const ProcedureState& Procedure() const;
   /// Of the scenario's procedure, as far as it went.
   ProcedureScore Score() const;

@@ -8,6 +8,15 @@
 
 namespace coronary
 {
+namespace
+{
+/// Of the reference radius, from where it is without plaque's yielding.
+double OpeningOf(const WallStation& station, double radius)
+{
+  return (radius - station.rest) / station.reference + station.pinched;
+}
+}
+
 WallStation MakeWallStation(
   double rest, double reference, double calcium, const DilationSettings& settings)
 {
@@ -26,7 +35,7 @@ WallStation MakeWallStation(
 
 double PlasticOpening(const WallStation& station, double radius)
 {
-  const double opening = (radius - station.rest) / station.reference;
+  const double opening = OpeningOf(station, radius);
   const double elastic = station.stiffness * (opening - station.plastic);
   if (station.stiffness == 0.0 || elastic <= station.yield + station.hardening * station.plastic)
   {
@@ -37,7 +46,7 @@ double PlasticOpening(const WallStation& station, double radius)
 
 double WallPressure(const WallStation& station, double radius, const DilationSettings& settings)
 {
-  const double opening = (radius - station.rest) / station.reference;
+  const double opening = OpeningOf(station, radius);
   double plaque = station.stiffness * (opening - PlasticOpening(station, radius));
   if (station.stented >= 0 && opening > station.plastic && opening < station.held)
   {
@@ -53,7 +62,7 @@ double WallPressure(const WallStation& station, double radius, const DilationSet
 
 double NaturalRadius(const WallStation& station, const DilationSettings& settings)
 {
-  double high = station.rest + station.plastic * station.reference;
+  double high = station.rest + (station.plastic - station.pinched) * station.reference;
   if (high <= station.reference)
   {
     return high;
@@ -109,7 +118,7 @@ void DilatableWall::Place(std::int64_t point, const StentRing& ring)
   if (station.stented < 0)
   {
     station.stented = static_cast<std::int32_t>(this->Stented_.size());
-    station.held = (this->Radii_[point] - station.rest) / station.reference;
+    station.held = OpeningOf(station, this->Radii_[point]);
     this->Stented_.emplace_back();
   }
   Stented& stented = this->Stented_[station.stented];
@@ -179,7 +188,7 @@ void DilatableWall::HoldRing(std::int64_t point, std::size_t rings, double radiu
     station.plastic = PlasticOpening(station, radius);
     if (station.stented >= 0)
     {
-      station.held = std::max(station.held, (radius - station.rest) / station.reference);
+      station.held = std::max(station.held, OpeningOf(station, radius));
     }
     this->SetRadius(point, radius);
     return;
@@ -222,6 +231,28 @@ void DilatableWall::ReleaseRing(std::int64_t point, std::size_t rings, bool flow
     },
     0.5 * ring.crimped, ring.natural, 1e-12);
   this->HoldRing(point, rings, radius, flows);
+}
+
+void DilatableWall::Pinch(std::int64_t point, double part, double least)
+{
+  WallStation& station = this->Stations_[point];
+  if (station.stented >= 0)
+  {
+    return; // its ring holds it
+  }
+  const double free = station.rest + station.plastic * station.reference;
+  const double left = std::max(std::min(free, least), (1.0 - part) * free);
+  station.pinched = (free - left) / station.reference;
+  if (station.pinched > 0.0)
+  {
+    // What was shifted yields as plaque of that much does.
+    const WallStation shifted = MakeWallStation(left, station.reference, 0.0, this->Settings_);
+    station.stiffness = std::max(station.stiffness, shifted.stiffness);
+    station.yield = std::max(station.yield, shifted.yield);
+    station.hardening = std::max(station.hardening, shifted.hardening);
+  }
+  this->Remember(point);
+  this->SetRadius(point, NaturalRadius(station, this->Settings_));
 }
 
 void DilatableWall::Release()

@@ -39,6 +39,7 @@ struct WallStation
   double yield = 0.0;        ///< atm
   double hardening = 0.0;    ///< atm a reference of plastic opening
   double plastic = 0.0;      ///< opening that stays
+  double pinched = 0.0;      ///< opening that a shifted carina takes, of a branch's mouth
   double held = 0.0;         ///< greatest opening since there is a stent
   std::int32_t stented = -1; ///< number of its rings in the wall's list; -1: none
 };
@@ -83,6 +84,11 @@ public:
   double Gap(std::int64_t point) const;
   /// atm that hold rings and wall open, together. @param radius  mm, inside
   double Resistance(std::int64_t point, double radius) const;
+
+  /// What presses from outside leaves a section so much narrower where nothing presses from inside.
+  /// Where there is a stent it holds.
+  /// @param part  of its radius, 0 to 1  @param least  mm that are left in any case
+  void Pinch(std::int64_t point, double part, double least);
 
   /// Sections that are not held any more go to where nothing presses, rings to where they and the wall balance.
   void Release();

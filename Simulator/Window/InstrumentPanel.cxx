@@ -10,6 +10,30 @@ namespace coronary
 namespace
 {
 const char* const NoBalloon = "none";
+constexpr double MouthTold = 0.05; // of the diameter, that it is narrower than before
+
+/// Of two wires, where the other one is.
+QString TextOfWires(const SessionSnapshot& moment, const WallTopology& topology)
+{
+  const TickReport& report = moment.report;
+  if (moment.secondWire.empty())
+  {
+    return {};
+  }
+  const WireReport& other = report.wires[1 - report.hand];
+  QString text = QString("\nIn hand: the %1 wire. The other  %2 mm, in %3")
+                   .arg(report.hand == 0 ? "first" : "second", Decimal(other.inserted, 1),
+                     BranchName(topology, other.branch));
+  for (const WireReport& wire : report.wires)
+  {
+    text += wire.held > 0.0
+      ? QString("\n%1 mm of the %2 wire are %3, %4 N")
+          .arg(Decimal(wire.held, 1), &wire == &report.wires[0] ? "first" : "second",
+            wire.jailed ? "jailed" : "held", Decimal(wire.grip, 2))
+      : QString();
+  }
+  return text;
+}
 
 QString TextOfCatheter(const TickReport& report)
 {
@@ -41,6 +65,16 @@ QString TextOfBalloon(const SessionSnapshot& moment, bool hasBalloon)
               .arg(QString::fromStdString(lesion.vessel), Decimal(100.0 * lesion.degree, 0),
                 Decimal(100.0 * lesion.degreeBefore, 0), Decimal(lesion.pressureRatio, 2),
                 Decimal(lesion.reserve, 2));
+  }
+  for (const MouthResult& mouth : moment.mouths)
+  {
+    if (mouth.degree > mouth.degreeBefore + MouthTold)
+    {
+      text += QString("\nMouth of %1  %2, FFR %3")
+                .arg(QString::fromStdString(mouth.vessel),
+                  mouth.closed ? QString("closed") : Decimal(100.0 * mouth.degree, 0) + " %",
+                  Decimal(mouth.reserve, 2));
+    }
   }
   for (const StentResult& stent : moment.results)
   {
@@ -85,6 +119,7 @@ InstrumentPanel::InstrumentPanel()
   form->addRow("Catheter", this->Catheter);
   form->addRow("", this->FromArch);
   form->addRow("Balloon", this->Balloon);
+  form->addRow(this->OtherWire);
   form->addRow(this->NextWire.button);
   form->addRow(this->NextBalloon.button);
   form->addRow(this->Text);
@@ -100,6 +135,10 @@ InstrumentPanel::InstrumentPanel()
   };
   exchanges(this->NextWire, RecordedEvent::ExchangeWire);
   exchanges(this->NextBalloon, RecordedEvent::Exchange);
+  QObject::connect(this->OtherWire, &QPushButton::clicked,
+    [this] {
+      this->chosen({ RecordedEvent::TakeWire, static_cast<double>(1 - this->Hand) });
+    });
 }
 
 void InstrumentPanel::NextButton::Show() const
@@ -144,19 +183,31 @@ void InstrumentPanel::ShowScenario(const Scenario& scenario, bool aorta)
     next->inUse = 0;
     next->Show();
   }
+  this->OtherWire->setVisible(scenario.secondWire.has_value());
+  this->ShowHand(0);
+}
+
+void InstrumentPanel::ShowHand(std::size_t hand)
+{
+  this->Hand = hand;
+  this->OtherWire->setText(hand == 0 ? "Take the second wire" : "Take the first wire");
 }
 
 void InstrumentPanel::ShowMoment(const SessionSnapshot& moment, const WallTopology& topology)
 {
   const TickReport& report = moment.report;
-  this->NextWire.Use(moment.wireNumber);
+  this->NextWire.Use(report.hand == 0 ? moment.wireNumber : moment.secondNumber);
+  if (report.hand != this->Hand)
+  {
+    this->ShowHand(report.hand);
+  }
   this->NextBalloon.Use(moment.balloonNumber);
   this->Text->setText(QString("Beyond the catheter  %1 mm, in %2\n%3\n"
                               "Hand  %4 N, %5 N mm    Tip  %6 N")
                         .arg(Decimal(report.inserted, 1), BranchName(topology, report.branch),
                           TextOfCatheter(report), Decimal(report.proximalForce, 2),
                           Decimal(report.proximalTorque, 2), Decimal(report.tipForce, 2)) +
-    TextOfBalloon(moment, !this->NextBalloon.names.empty()));
+    TextOfWires(moment, topology) + TextOfBalloon(moment, !this->NextBalloon.names.empty()));
 }
 
 void InstrumentPanel::Take(Scenario& scenario) const

@@ -20,7 +20,8 @@ class InstrumentPanel : public QGroupBox
 {
 public:
   InstrumentPanel();
-  std::function<void(const RecordedEvent&)> chosen; ///< another wire, another balloon
+  std::function<void(const RecordedEvent&)>
+    chosen; ///< another wire, another balloon, the other wire in hand
   /// @param aorta  whether there is one that a guide can come through
   void ShowScenario(const Scenario& scenario, bool aorta);
   void ShowMoment(const SessionSnapshot& moment, const WallTopology& topology);
@@ -40,12 +41,16 @@ private:
     void Use(std::size_t number);
   };
 
+  void ShowHand(std::size_t hand);
+
   QComboBox* Wire = ChoiceBox();
   QComboBox* Catheter = ChoiceBox();
   QCheckBox* FromArch = new QCheckBox("from the arch");
   QComboBox* Balloon = ChoiceBox();
   NextButton NextWire;
   NextButton NextBalloon;
+  QPushButton* OtherWire = PanelButton("", "The hand goes to it; this one is held where it is");
+  std::size_t Hand = 0; ///< wire that it is on
   QLabel* Text = new QLabel;
 };
 }

@@ -527,16 +527,18 @@ void SessionWindow::ShowScene()
   this->Monitor->SetState(this->Now, this->Shown.completeness, this->XRay->Mode());
 }
 
-/// The wire's tip for others: its last axis is the way forward.
+/// The tip of the wire in hand for others: its last axis is the way forward.
 void SessionWindow::SendPose()
 {
-  if (!this->Igtl || this->Now.wire.size() < 2)
+  const std::vector<Vector3>& wire =
+    this->Now.report.hand == 0 ? this->Now.wire : this->Now.secondWire;
+  if (!this->Igtl || wire.size() < 2)
   {
     return;
   }
   ToolPose pose;
-  pose.origin = this->Now.wire[0];
-  pose.axes[2] = (this->Now.wire[0] - this->Now.wire[1]).normalized();
+  pose.origin = wire[0];
+  pose.axes[2] = (wire[0] - wire[1]).normalized();
   pose.axes[0] = pose.axes[2].unitOrthogonal();
   pose.axes[1] = pose.axes[2].cross(pose.axes[0]);
   this->Igtl->SendPose("WireTip", pose, this->Now.seconds);

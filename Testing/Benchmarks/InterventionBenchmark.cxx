@@ -57,6 +57,52 @@ BENCHMARK(Tick)
   ->MinTime(2.0)
   ->Unit(benchmark::kMicrosecond);
 
+// Two wires in the vessel, the first one with a balloon (1) or without (0); the other one is held.
+void TwoWires(benchmark::State& state)
+{
+  const Scenario scenario = LoadScenario("lad-bifurcation");
+  static const std::shared_ptr<WallMotion> wall =
+    MakePhantomWallMotion(scenario.vessels.phantom, scenario.vessels.phantom.surfaceSpacing, 40);
+  InterventionSettings settings = scenario.settings;
+  settings.rootBranch = RootBranch(wall->Topology(), scenario.artery);
+  const bool carries = state.range(1) != 0;
+  Intervention intervention(wall, scenario.wire, scenario.catheter, settings,
+    carries ? scenario.balloon : std::nullopt, scenario.secondWire);
+  DriveInput input;
+  for (const std::size_t wire : { 1, 0 })
+  {
+    intervention.TakeWire(wire);
+    for (double way = 0.0; way < static_cast<double>(state.range(0));
+         way += 15.0 / settings.tickRate)
+    {
+      input.wirePosition += 15.0 / settings.tickRate;
+      intervention.Step(input);
+    }
+  }
+  for (int k = 0; k < 4000 && carries; ++k)
+  {
+    input.balloonPosition += 55.0 / 4000.0;
+    intervention.Step(input);
+  }
+  long k = 0;
+  for (auto _ : state)
+  {
+    input.wirePosition += (k / 200) % 2 == 0 ? -0.005 : 0.005;
+    intervention.Step(input);
+    ++k;
+  }
+  state.counters["segments"] = static_cast<double>(intervention.NumberOfSegments());
+  state.counters["beyond"] = intervention.Report().wires[1].inserted;
+  state.counters["balloon"] = intervention.Report().balloon.tip;
+}
+BENCHMARK(TwoWires)
+  ->ArgNames({ "mm", "balloon" })
+  ->Args({ 60, 0 })
+  ->Args({ 100, 0 })
+  ->Args({ 100, 1 })
+  ->MinTime(2.0)
+  ->Unit(benchmark::kMicrosecond);
+
 void RodAlone(benchmark::State& state)
 {
   const auto count = state.range(0);

@@ -453,8 +453,7 @@ TEST(Lesions, TheRecordedDilationRepeatsToTheBit)
   auto source = std::make_unique<ReplaySource>(
     std::string(DYNAMICCORONARY_SOURCE_DIR) + "/Testing/Data/Driving/lad-lesion.pcirec");
   const ReplaySource* replay = source.get();
-  const Scenario scenario =
-    ScenarioFromText(source->Reader().Header().scenario, "The recording", ".");
+  const Scenario scenario = RecordedScenario(source->Reader().Header().scenario, "The recording");
   const std::shared_ptr<WallMotion> wall = LesionedPhantom();
   const std::uint64_t hash = WallHash(*wall);
   ASSERT_EQ(hash, source->Reader().Header().meshHash);

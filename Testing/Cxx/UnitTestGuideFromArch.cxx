@@ -328,8 +328,7 @@ TEST(GuideFromArch, TheRecordedOneRepeatsToTheBit)
   auto source = std::make_unique<ReplaySource>(
     std::string(DYNAMICCORONARY_SOURCE_DIR) + "/Testing/Data/Driving/engage-lca.pcirec");
   const ReplaySource* replay = source.get();
-  const Scenario scenario =
-    ScenarioFromText(source->Reader().Header().scenario, "The recording", ".");
+  const Scenario scenario = RecordedScenario(source->Reader().Header().scenario, "The recording");
   const auto wall =
     MakePhantomWallMotion(scenario.vessels.phantom, scenario.vessels.phantom.surfaceSpacing, 40);
   const std::uint64_t hash = WallHash(*wall);

@@ -329,8 +329,7 @@ TEST(OcclusionProcedure, TheRecordedOneRepeatsToTheBit)
   auto source = std::make_unique<ReplaySource>(
     std::string(DYNAMICCORONARY_SOURCE_DIR) + "/Testing/Data/Driving/cto-lad.pcirec");
   const ReplaySource* replay = source.get();
-  const Scenario scenario =
-    ScenarioFromText(source->Reader().Header().scenario, "The recording", ".");
+  const Scenario scenario = RecordedScenario(source->Reader().Header().scenario, "The recording");
   const auto wall = std::make_shared<NarrowedWallMotion>(
     MakePhantomWallMotion(scenario.vessels.phantom, scenario.vessels.phantom.surfaceSpacing, 40),
     scenario.lesions);

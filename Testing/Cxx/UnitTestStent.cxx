@@ -527,7 +527,7 @@ TEST(Stent, TheRecordedDeploymentRepeatsToTheBit)
   auto source = std::make_unique<ReplaySource>(
     std::string(DYNAMICCORONARY_SOURCE_DIR) + "/Testing/Data/Driving/lad-stent.pcirec");
   const ReplaySource* replay = source.get();
-  Scenario scenario = ScenarioFromText(source->Reader().Header().scenario, "The recording", ".");
+  Scenario scenario = RecordedScenario(source->Reader().Header().scenario, "The recording");
   ASSERT_TRUE(scenario.balloon && scenario.balloon->stent);
   // (It was recorded before scenarios had procedures.)
   scenario.procedure = LoadScenario("lad-stent").procedure;
