@@ -1,5 +1,6 @@
 // Tracking under the motion of a measured heart: a coronary tree carried on its epicardial surface, CT-like images
 // of it, tracked, against where it was carried.
+#include "BranchPlacement.h"
 #include "CarriedHeart.h"
 #include "CenterlineTracking.h"
 #include "CounterRandom.h"
@@ -559,18 +560,22 @@ void Print(const Judgement& one, const std::string& hidden)
   }
 }
 
-/// How far the lumens that the images show are from where they are, and from where they were tracked.
-void TellLumens(const Polylines& lines, const std::vector<std::vector<Vector3>>& truth,
-  const PoseSequence& poses, const std::function<ScalarImage(double time)>& imageAt)
+/// How far the lumens that the images show are from where they are, and from where they were tracked; and how likely each branch
+/// was said to be within 1 mm of its axis.
+void TellSights(const Settings& options, const Polylines& lines,
+  const std::vector<std::vector<Vector3>>& truth, const PoseSequence& poses,
+  const std::function<ScalarImage(double time)>& imageAt)
 {
   Errors fromTruth;
   Errors fromTracked;
   std::size_t places = 0;
+  PlacementEvidence evidence;
   for (std::size_t k = 0; k < poses.times.size(); ++k)
   {
     const ScalarImage image = imageAt(poses.times[k]);
     const std::vector<double> ofTruth = SeeLumens(image, lines, truth[2 * k]).beside;
-    const std::vector<double> ofTracked = SeeLumens(image, lines, poses.points[k]).beside;
+    evidence.sights.push_back(SeeLumens(image, lines, poses.points[k]));
+    const std::vector<double>& ofTracked = evidence.sights.back().beside;
     places += ofTruth.size();
     for (std::size_t n = 0; n < ofTruth.size(); ++n)
     {
@@ -584,11 +589,41 @@ void TellLumens(const Polylines& lines, const std::vector<std::vector<Vector3>>&
   if (!fromTruth.values.empty())
   {
     std::printf("%.3f of the places are beside a lumen that the images of tracked frames show: "
-                "%.3f mm from the truth, "
-                "%.3f mm from where they were tracked\n",
+                "%.3f mm from the truth, %.3f mm from where they were tracked\n",
       static_cast<double>(fromTruth.values.size()) / static_cast<double>(places), fromTruth.Mean(),
       fromTracked.Mean());
   }
+  const std::vector<std::vector<double>> said = PlacementConfidences(
+    lines, evidence, poses, { TimeOf(ReferenceFrame), options.window / CycleSeconds });
+  int misplaced = 0;
+  int sure = 0;
+  double greatest = 0.0;
+  for (std::size_t k = 0; k < poses.times.size(); ++k)
+  {
+    for (const std::vector<std::int64_t>& line : lines.lines)
+    {
+      double mean = 0.0;
+      for (const std::int64_t point : line)
+      {
+        mean += DistanceToAxis(lines, truth[2 * k], poses.points[k][point]) /
+          static_cast<double>(line.size());
+      }
+      const double confidence = said[k][line.back()];
+      misplaced += mean > PlacedWithin ? 1 : 0;
+      if (mean > PlacedWithin && confidence > 0.5)
+      {
+        ++sure;
+        greatest = std::max(greatest, confidence);
+        std::printf("  %s at %.2f: %.2f mm off, said %.2f\n",
+          VesselNames[static_cast<std::size_t>(&line - lines.lines.data())].c_str(), poses.times[k],
+          mean, confidence);
+      }
+    }
+  }
+  std::printf("%zu branches at tracked frames, %d not within %.0f mm, of these with a confidence "
+              "above 0.5: %d "
+              "(at most %.2f)\n",
+    poses.times.size() * lines.lines.size(), misplaced, PlacedWithin, sure, greatest);
 }
 
 bool Run(const Settings& options)
@@ -681,7 +716,7 @@ bool Run(const Settings& options)
     static_cast<double>(tracked.near) / std::max(tracked.called, 1), report.imagesRead);
   if (!options.scanner.empty())
   {
-    TellLumens(lines, truth, poses, imageAt);
+    TellSights(options, lines, truth, poses, imageAt);
   }
   std::printf("Within limits, as `run` goes on with it:\n");
   Print(limited, options.hidden);
