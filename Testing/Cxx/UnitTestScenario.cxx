@@ -70,7 +70,7 @@ public:
 TEST(UnitTestScenario, BuiltInOnesAreGood)
 {
   const auto list = coronary::BuiltInScenarios();
-  ASSERT_EQ(list.size(), 11U);
+  ASSERT_EQ(list.size(), 12U);
   for (const auto& one : list)
   {
     const Scenario scenario = LoadScenario(one.name);
@@ -105,6 +105,15 @@ TEST(UnitTestScenario, BuiltInOnesAreGood)
   EXPECT_EQ(coronary::WireOf(occluded, 2), nullptr);
   ASSERT_EQ(occluded.lesions.size(), 1U);
   EXPECT_EQ(occluded.lesions[0].degree, 1.0);
+  const Scenario forked = LoadScenario("lad-bifurcation");
+  ASSERT_TRUE(forked.secondWire);
+  EXPECT_NO_THROW(forked.secondWire->Validate());
+  EXPECT_FALSE(occluded.secondWire);
+  const Scenario events = LoadScenario("lca-events");
+  ASSERT_EQ(events.incidents.size(), 2U);
+  EXPECT_EQ(events.incidents[0].kind, coronary::Incident::Kind::Spasm);
+  EXPECT_EQ(events.incidents[1].when, coronary::Incident::When::Called);
+  EXPECT_TRUE(events.contrast.guideLumen);
 }
 
 TEST(UnitTestScenario, TextSaysEverythingToTheBit)
