@@ -140,24 +140,20 @@ std::string Numbers(const Json& session)
 std::string Results(const Json& session)
 {
   std::string page;
-  if (session.contains("lesions") && !session["lesions"].empty())
+  const auto narrowed = [&](const char* what, const char* title)
   {
-    page += "<h2>Lesions</h2>\n" +
-      Table(session["lesions"],
-        { { "vessel", "vessel" }, { "reference, mm", "reference_mm" },
-          { "stenosis before, %", "stenosis_before_percent" }, { "now, %", "stenosis_percent" },
-          { "FFR before", "ffr_before" }, { "now", "ffr" } },
-        1);
-  }
-  if (session.contains("side_branches") && !session["side_branches"].empty())
-  {
-    page += "<h2>Side branches</h2>\n" +
-      Table(session["side_branches"],
-        { { "vessel", "vessel" }, { "reference, mm", "reference_mm" },
-          { "stenosis before, %", "stenosis_before_percent" }, { "now, %", "stenosis_percent" },
-          { "FFR before", "ffr_before" }, { "now", "ffr" } },
-        1);
-  }
+    if (session.contains(what) && !session[what].empty())
+    {
+      page += std::string("<h2>") + title + "</h2>\n" +
+        Table(session[what],
+          { { "vessel", "vessel" }, { "reference, mm", "reference_mm" },
+            { "stenosis before, %", "stenosis_before_percent" }, { "now, %", "stenosis_percent" },
+            { "FFR before", "ffr_before" }, { "now", "ffr" } },
+          1);
+    }
+  };
+  narrowed("lesions", "Lesions");
+  narrowed("side_branches", "Side branches");
   if (session.contains("stents") && !session["stents"].empty())
   {
     page += "<h2>Stents</h2>\n" +

@@ -348,14 +348,17 @@ void LesionWatch::StepMouths(
     const char* name = one.result.vessel.c_str();
     if (closed)
     {
-      this->Events_.push_back({ ProcedureEvent::Kind::SideBranchClosed, seconds, one.result.branch,
-        shift, one.result.place });
+      this->Note({ ProcedureEvent::Kind::SideBranchClosed, seconds, one.result.branch, shift,
+                   one.result.place },
+        Format("The side branch %s is closed: carina and plaque were shifted over its mouth, and "
+               "no wire is in it. It leaves %.1f mm from the ostium.",
+          name, one.result.place),
+        said);
     }
-    said.push_back(closed
-        ? Format("The side branch %s is closed: carina and plaque were shifted over its mouth, and "
-                 "no wire is in it. It leaves %.1f mm from the ostium.",
-            name, one.result.place)
-        : Format("The side branch %s is open again.", name));
+    else
+    {
+      said.push_back(Format("The side branch %s is open again.", name));
+    }
   }
 }
 

@@ -19,14 +19,27 @@ using namespace coronary;
 
 namespace
 {
+/// Of the standard phantom, which all scenarios here have.
+const std::shared_ptr<WallMotion>& StandardWall(const Scenario& scenario)
+{
+  static const std::shared_ptr<WallMotion> wall =
+    MakePhantomWallMotion(scenario.vessels.phantom, scenario.vessels.phantom.surfaceSpacing, 40);
+  return wall;
+}
+
+InterventionSettings SettingsIn(const WallMotion& wall, const Scenario& scenario)
+{
+  InterventionSettings settings = scenario.settings;
+  settings.rootBranch = RootBranch(wall.Topology(), scenario.artery);
+  return settings;
+}
+
 // Fed until it has so many segments, then pushed to and fro by a millimetre.
 void Tick(benchmark::State& state)
 {
   const Scenario scenario = LoadScenario("phantom-lca");
-  static const std::shared_ptr<WallMotion> wall =
-    MakePhantomWallMotion(scenario.vessels.phantom, scenario.vessels.phantom.surfaceSpacing, 40);
-  InterventionSettings settings = scenario.settings;
-  settings.rootBranch = RootBranch(wall->Topology(), scenario.artery);
+  const std::shared_ptr<WallMotion>& wall = StandardWall(scenario);
+  const InterventionSettings settings = SettingsIn(*wall, scenario);
   Intervention intervention(wall, scenario.wire, scenario.catheter, settings);
   DriveInput input;
   while (intervention.NumberOfSegments() < state.range(0))
@@ -61,10 +74,8 @@ BENCHMARK(Tick)
 void TwoWires(benchmark::State& state)
 {
   const Scenario scenario = LoadScenario("lad-bifurcation");
-  static const std::shared_ptr<WallMotion> wall =
-    MakePhantomWallMotion(scenario.vessels.phantom, scenario.vessels.phantom.surfaceSpacing, 40);
-  InterventionSettings settings = scenario.settings;
-  settings.rootBranch = RootBranch(wall->Topology(), scenario.artery);
+  const std::shared_ptr<WallMotion>& wall = StandardWall(scenario);
+  const InterventionSettings settings = SettingsIn(*wall, scenario);
   const bool carries = state.range(1) != 0;
   Intervention intervention(wall, scenario.wire, scenario.catheter, settings,
     carries ? scenario.balloon : std::nullopt, scenario.secondWire);

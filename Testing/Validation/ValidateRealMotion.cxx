@@ -480,6 +480,16 @@ struct Judgement
   std::vector<std::vector<double>> errors;  ///< per frame and point
 };
 
+double MeanOf(const std::vector<std::int64_t>& line, const std::vector<double>& errors)
+{
+  double mean = 0.0;
+  for (const std::int64_t point : line)
+  {
+    mean += errors[point] / static_cast<double>(line.size());
+  }
+  return mean;
+}
+
 Judgement Judge(const Polylines& lines, const std::vector<std::vector<Vector3>>& truth,
   const PoseSequence& poses, int hidden)
 {
@@ -519,11 +529,7 @@ Judgement Judge(const Polylines& lines, const std::vector<std::vector<Vector3>>&
     }
     for (std::size_t vessel = 0; vessel < lines.lines.size(); ++vessel)
     {
-      double mean = 0.0;
-      for (const std::int64_t point : lines.lines[vessel])
-      {
-        mean += errors[point] / static_cast<double>(lines.lines[vessel].size());
-      }
+      const double mean = MeanOf(lines.lines[vessel], errors);
       if (mean > result.worst)
       {
         result.worst = mean;
@@ -561,9 +567,10 @@ void Print(const Judgement& one, const std::string& hidden)
 }
 
 /// How far the lumens that the images show are from where they are, and from where they were tracked; and how likely each branch
-/// was said to be within 1 mm of its axis.
+/// was said to be within 1 mm of its axis. @param errors  mm, per frame and point
 void TellSights(const Settings& options, const Polylines& lines,
   const std::vector<std::vector<Vector3>>& truth, const PoseSequence& poses,
+  const std::vector<std::vector<double>>& errors,
   const std::function<ScalarImage(double time)>& imageAt)
 {
   Errors fromTruth;
@@ -602,12 +609,7 @@ void TellSights(const Settings& options, const Polylines& lines,
   {
     for (const std::vector<std::int64_t>& line : lines.lines)
     {
-      double mean = 0.0;
-      for (const std::int64_t point : line)
-      {
-        mean += DistanceToAxis(lines, truth[2 * k], poses.points[k][point]) /
-          static_cast<double>(line.size());
-      }
+      const double mean = MeanOf(line, errors[2 * k]);
       const double confidence = said[k][line.back()];
       misplaced += mean > PlacedWithin ? 1 : 0;
       if (mean > PlacedWithin && confidence > 0.5)
@@ -716,7 +718,7 @@ bool Run(const Settings& options)
     static_cast<double>(tracked.near) / std::max(tracked.called, 1), report.imagesRead);
   if (!options.scanner.empty())
   {
-    TellSights(options, lines, truth, poses, imageAt);
+    TellSights(options, lines, truth, poses, tracked.errors, imageAt);
   }
   std::printf("Within limits, as `run` goes on with it:\n");
   Print(limited, options.hidden);
