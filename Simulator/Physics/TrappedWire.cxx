@@ -37,7 +37,7 @@ TrappedWire::Station TrappedWire::StationAt(std::int64_t point, double inside, d
   station.wallNow = station.wallNext = outside;
   for (const Chain& old : this->Before)
   {
-    for (const Station& one : old)
+    for (const Station& one : old.stations)
     {
       if (one.point == point)
       {
@@ -51,13 +51,23 @@ TrappedWire::Station TrappedWire::StationAt(std::int64_t point, double inside, d
   return station;
 }
 
-void TrappedWire::Close(Chain& chain)
+void TrappedWire::Close(std::vector<Station>& stations)
 {
-  if (chain.size() > 1)
+  if (stations.size() > 1)
   {
-    this->Chains.push_back(chain);
+    Chain chain;
+    chain.stations = stations;
+    chain.centre = stations[stations.size() / 2].now;
+    for (const Station& station : stations)
+    {
+      const double axis =
+        std::max((station.now - chain.centre).norm(), (station.next - chain.centre).norm());
+      chain.reach =
+        std::max(chain.reach, axis + std::max(station.wallNow, station.wallNext) + 2.0 * LeavesAt);
+    }
+    this->Chains.push_back(std::move(chain));
   }
-  chain.clear();
+  stations.clear();
 }
 
 void TrappedWire::BeginFrame(const std::vector<PlacedStent>& stents, const BalloonOnWire* balloon,
@@ -75,7 +85,7 @@ void TrappedWire::BeginFrame(const std::vector<PlacedStent>& stents, const Ballo
   this->Chains.clear();
   this->Seconds = seconds;
   this->Share = 0.0;
-  Chain chain;
+  std::vector<Station> chain;
   for (const std::size_t number : this->Stents)
   {
     const PlacedStent& stent = stents[number];
@@ -117,6 +127,10 @@ TrappedWire::At TrappedWire::Meet(
   At place = At::Free;
   for (const Chain& chain : this->Chains)
   {
+    if ((sample.centre - chain.centre).squaredNorm() > chain.reach * chain.reach)
+    {
+      continue;
+    }
     const At here = this->MeetChain(chain, sample, length, contacts);
     if (here == At::Held)
     {
@@ -130,15 +144,16 @@ TrappedWire::At TrappedWire::Meet(
 TrappedWire::At TrappedWire::MeetChain(
   const Chain& chain, const ContactSample& sample, double length, SampleContacts& contacts) const
 {
+  const std::vector<Station>& stations = chain.stations;
   const auto at = [&](const Station& station)
   { return Vector3(station.now + this->Share * (station.next - station.now)); };
   double squared = 1e300;
   std::size_t piece = 0;
   double along = 0.0;
-  Vector3 before = at(chain[0]);
-  for (std::size_t n = 1; n < chain.size(); ++n)
+  Vector3 before = at(stations[0]);
+  for (std::size_t n = 1; n < stations.size(); ++n)
   {
-    const Vector3 here = at(chain[n]);
+    const Vector3 here = at(stations[n]);
     const SegmentPlace place = NearestOnSegment(sample.centre, before, here);
     if (place.squaredDistance < squared)
     {
@@ -148,12 +163,12 @@ TrappedWire::At TrappedWire::MeetChain(
     }
     before = here;
   }
-  if ((piece == 0 && along <= 0.0) || (piece + 2 == chain.size() && along >= 1.0))
+  if ((piece == 0 && along <= 0.0) || (piece + 2 == stations.size() && along >= 1.0))
   {
     return At::Free; // beyond its ends
   }
-  const Station& a = chain[piece];
-  const Station& b = chain[piece + 1];
+  const Station& a = stations[piece];
+  const Station& b = stations[piece + 1];
   const auto mixed = [&](double Station::*now, double Station::*next) {
     return Mixed(Mixed(a.*now, a.*next, this->Share), Mixed(b.*now, b.*next, this->Share), along);
   };

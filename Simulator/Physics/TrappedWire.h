@@ -66,12 +66,17 @@ private:
     double wallNext = 0.0;
     double pressure = 0.0; ///< MPa on the wall
   };
-  using Chain = std::vector<Station>;
+  struct Chain
+  {
+    std::vector<Station> stations;
+    Vector3 centre = Vector3::Zero();
+    double reach = 0.0; ///< mm from there: whatever is further is free
+  };
 
   /// @param inside, outside  mm, of what is open and of what is around it
   Station StationAt(std::int64_t point, double inside, double outside, const DilatableWall& wall,
     const std::vector<Vector3>& axisNow, const std::vector<Vector3>& axisNext) const;
-  void Close(Chain& chain);
+  void Close(std::vector<Station>& stations);
   At MeetChain(
     const Chain& chain, const ContactSample& sample, double length, SampleContacts& contacts) const;
 

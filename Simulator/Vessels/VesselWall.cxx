@@ -1,5 +1,7 @@
 #include "CubicStep.h"
+#include "KernelChoice.h"
 #include "VesselWallData.h"
+#include "WallKernels.h"
 
 #include <utility>
 
@@ -12,6 +14,16 @@ double Ramp(double x, double from, double to)
 {
   return CubicStep((x - from) / (to - from));
 }
+}
+
+KernelChoice<WallKernels>& WallKernelChoice()
+{
+#if defined(DYNAMICCORONARY_WIDE_KERNELS)
+  static KernelChoice<WallKernels> choice(WallKernelsBaseline, &WallKernelsAvx2);
+#else
+  static KernelChoice<WallKernels> choice(WallKernelsBaseline);
+#endif
+  return choice;
 }
 
 WallHit VesselWall::Internals::ClosestTo(const Vector3& p, std::int32_t patch, std::int32_t hint)
@@ -120,7 +132,6 @@ WallMemory& VesselWall::Internals::Of(std::int64_t index)
   if (isNew)
   {
     known->second.index = index;
-    known->second.list.reserve(96);
   }
   return known->second;
 }
@@ -166,7 +177,7 @@ double VesselWall::Internals::Collect(
   memory.velocity = this->VelocityAt(hit.triangle, hit.on.b, hit.on.c);
   memory.radius = radius;
   memory.clearance = radius;
-  memory.list.clear();
+  memory.list.Clear();
   double minimum = Infinity;
   this->MarkAround(memory.patch);
   this->ForEachNear(p, memory.velocity, memory.window, radius,
@@ -187,8 +198,7 @@ double VesselWall::Internals::Collect(
       if (squared < further * further)
       {
         const double distance = std::sqrt(squared) * (1.0 - 1e-6) - 1e-6;
-        memory.list.push_back({ triangle, static_cast<float>(distance), static_cast<float>(speed),
-          0.0f, { 0.0f, 0.0f, 0.0f } });
+        memory.list.Add(triangle, static_cast<float>(distance), static_cast<float>(speed));
         memory.clearance = std::min(memory.clearance, distance - memory.window * speed);
         minimum = std::min(minimum, distance);
       }
@@ -264,6 +274,84 @@ void VesselWall::Internals::Search(WallMemory& memory, const Vector3& p, double 
                                      : std::max(radius, range + 0.5 * (nearest.distance - range)));
 }
 
+void VesselWall::Internals::Sift(const WallMemory& memory)
+{
+  const WallCandidates& list = memory.list;
+  CandidateRun& run = this->Run;
+  run.distance = list.distance.data();
+  run.speed = list.speed.data();
+  run.passed = list.passed.data();
+  for (int k = 0; k < 3; ++k)
+  {
+    run.place[k] = list.place[k].data();
+  }
+  const std::size_t count = list.triangle.size();
+  this->Sifted.resize(count);
+  WallKernelChoice().Get().sift(run, static_cast<int>(count), this->Sifted.data());
+  this->Now.clear();
+  this->Later.clear();
+  for (std::size_t i = 0; i < count; ++i)
+  {
+    if (this->Sifted[i] != Candidate::TooFar)
+    {
+      (this->Sifted[i] == Candidate::Now ? this->Now : this->Later)
+        .push_back(static_cast<std::int32_t>(i));
+    }
+  }
+}
+
+template <typename Visit>
+void VesselWall::Internals::Look(
+  WallMemory& memory, const Vector3& p, const std::vector<std::int32_t>& which, const Visit& visit)
+{
+  const WallKernels& kernels = WallKernelChoice().Get();
+  TriangleBatch& batch = this->Batch;
+  for (std::size_t first = 0; first < which.size(); first += TriangleBatch::Size)
+  {
+    const int count =
+      static_cast<int>(std::min<std::size_t>(TriangleBatch::Size, which.size() - first));
+    for (int i = 0; i < count; ++i)
+    {
+      const WallCorners& t = this->Triangles[memory.list.triangle[which[first + i]]];
+      for (int k = 0; k < 3; ++k)
+      {
+        const Vector3 corner = this->At(t.vertex[k]);
+        batch.corner[3 * k][i] = corner[0];
+        batch.corner[3 * k + 1][i] = corner[1];
+        batch.corner[3 * k + 2][i] = corner[2];
+      }
+    }
+    kernels.nearest(batch, count, p.data());
+    for (int i = 0; i < count; ++i)
+    {
+      const std::int32_t candidate = which[first + i];
+      WallHit hit;
+      hit.triangle = memory.list.triangle[candidate];
+      if (batch.feature[i] >= 0.0)
+      {
+        hit.on.point = Vector3(batch.point[0][i], batch.point[1][i], batch.point[2][i]);
+        hit.on.squaredDistance = batch.squaredDistance[i];
+        hit.on.b = batch.b[i];
+        hit.on.c = batch.c[i];
+        hit.on.feature = static_cast<TriangleFeature>(static_cast<int>(batch.feature[i]));
+      }
+      else
+      {
+        hit.on = this->Nearest(hit.triangle, p);
+      }
+      hit.distance = std::sqrt(hit.on.squaredDistance);
+      const float atLeast = static_cast<float>(hit.distance) * 0.999999f - 2e-6f;
+      memory.list.distance[candidate] = atLeast;
+      memory.list.passed[candidate] = this->Run.now;
+      for (int k = 0; k < 3; ++k)
+      {
+        memory.list.place[k][candidate] = this->Run.at[k];
+      }
+      visit(atLeast, hit);
+    }
+  }
+}
+
 bool VesselWall::Internals::Evaluate(
   WallMemory& memory, const Vector3& p, double range, WallHit& nearest)
 {
@@ -283,12 +371,10 @@ bool VesselWall::Internals::Evaluate(
     const bool stale = memory.frame != this->Frame;
     const double passed = stale ? memory.rest + this->Time : this->Time - memory.begin;
     const Vector3 offset = p - memory.place - passed * memory.velocity;
-    const float* at = this->Offset;
-    std::copy(offset.data(), offset.data() + 3, this->Offset);
-    const auto now = static_cast<float>(passed);
-    this->Passed = now;
-    this->Later.clear();
-    const auto change = static_cast<float>(stale ? this->VelocityChange : 0.0);
+    CandidateRun& run = this->Run;
+    std::copy(offset.data(), offset.data() + 3, run.at);
+    run.now = static_cast<float>(passed);
+    run.change = static_cast<float>(stale ? this->VelocityChange : 0.0);
     // What was nearest the last time tells how far one has to look.
     double known = Infinity;
     if (memory.nearest >= 0)
@@ -296,35 +382,22 @@ bool VesselWall::Internals::Evaluate(
       known = std::sqrt(this->Nearest(memory.nearest, p).squaredDistance);
     }
     const double wanted = memory.side == WallSide::Outside ? known : std::min(known, range);
-    const auto limit = static_cast<float>(wanted + this->Blend) * 1.00001f + 1e-5f;
-    const auto further = std::max(0.0f, static_cast<float>(range) * 1.00001f + 1e-5f - limit);
-    for (WallCandidate& candidate : memory.list)
-    {
-      const float slack =
-        candidate.distance - (candidate.speed + change) * std::abs(now - candidate.passed) - limit;
-      const float x = at[0] - candidate.place[0];
-      const float y = at[1] - candidate.place[1];
-      const float z = at[2] - candidate.place[2];
-      const float moved = x * x + y * y + z * z;
-      if (slack > 0.0f && slack * slack > moved)
+    run.limit = static_cast<float>(wanted + this->Blend) * 1.00001f + 1e-5f;
+    run.further = std::max(0.0f, static_cast<float>(range) * 1.00001f + 1e-5f - run.limit);
+    this->Sift(memory);
+    this->Look(memory, p, this->Now,
+      [&](float atLeast, const WallHit& hit)
       {
-        if (!(slack > further && (slack - further) * (slack - further) > moved))
+        if (hit.distance < nearest.distance ||
+          (hit.distance == nearest.distance && hit.triangle < nearest.triangle))
         {
-          this->Later.push_back(static_cast<std::int32_t>(&candidate - memory.list.data()));
+          nearest = hit;
         }
-        continue;
-      }
-      const WallHit hit = this->Look(candidate, p);
-      if (hit.distance < nearest.distance ||
-        (hit.distance == nearest.distance && hit.triangle < nearest.triangle))
-      {
-        nearest = hit;
-      }
-      if (candidate.distance <= limit + further)
-      {
-        this->Hits.push_back(hit);
-      }
-    }
+        if (atLeast <= run.limit + run.further)
+        {
+          this->Hits.push_back(hit);
+        }
+      });
     const bool found = nearest.distance + drift <= memory.radius;
     if (found)
     {
@@ -345,38 +418,27 @@ bool VesselWall::Internals::Evaluate(
   }
 }
 
-WallHit VesselWall::Internals::Look(WallCandidate& candidate, const Vector3& p) const
-{
-  WallHit hit;
-  hit.triangle = candidate.triangle;
-  hit.on = this->Nearest(candidate.triangle, p);
-  hit.distance = std::sqrt(hit.on.squaredDistance);
-  candidate.distance = static_cast<float>(hit.distance) * 0.999999f - 2e-6f;
-  candidate.passed = this->Passed;
-  std::copy(this->Offset, this->Offset + 3, candidate.place);
-  return hit;
-}
-
 void VesselWall::Internals::EvaluateLater(
   WallMemory& memory, const Vector3& p, double range, const Vector3* first)
 {
-  for (const std::int32_t i : this->Later)
+  const auto isAlike = [&](std::int32_t i)
   {
-    WallCandidate& candidate = memory.list[i];
-    const WallCorners& t = this->Triangles[candidate.triangle];
+    const WallCorners& t = this->Triangles[memory.list.triangle[i]];
     // Where the corners' normals are within 60 degrees, those of all places between them are.
-    if (first != nullptr && t.wall && this->NormalAt(t.vertex[0]).dot(*first) > 0.5 &&
+    return first != nullptr && t.wall && this->NormalAt(t.vertex[0]).dot(*first) > 0.5 &&
       this->NormalAt(t.vertex[1]).dot(*first) > 0.5 &&
-      this->NormalAt(t.vertex[2]).dot(*first) > 0.5)
+      this->NormalAt(t.vertex[2]).dot(*first) > 0.5;
+  };
+  this->Later.erase(
+    std::remove_if(this->Later.begin(), this->Later.end(), isAlike), this->Later.end());
+  this->Look(memory, p, this->Later,
+    [&](float, const WallHit& hit)
     {
-      continue;
-    }
-    const WallHit hit = this->Look(candidate, p);
-    if (hit.distance <= range)
-    {
-      this->Hits.push_back(hit);
-    }
-  }
+      if (hit.distance <= range)
+      {
+        this->Hits.push_back(hit);
+      }
+    });
   this->Later.clear();
 }
 

@@ -9,6 +9,7 @@
 #include "NearestOnTriangle.h"
 #include "Numbers.h"
 #include "VesselWall.h"
+#include "WallKernels.h"
 
 #include <algorithm>
 #include <array>
@@ -57,15 +58,37 @@ enum class WallSide
   Free ///< beyond an open cap
 };
 
-/// A triangle that may matter, and where it was last: until sample and triangle have moved by what it was too far,
-/// it need not be looked at.
-struct WallCandidate
+/// Of a sample: as CandidateRun.
+struct WallCandidates
 {
-  std::int32_t triangle;
-  float distance; ///< then, rounded down, mm
-  float speed;    ///< mm/s: greatest of its corners against the path
-  float passed;   ///< s since triangles were looked up
-  float place[3]; ///< of the sample against the path, mm
+  std::vector<std::int32_t> triangle;
+  std::vector<float> distance;
+  std::vector<float> speed;
+  std::vector<float> passed;
+  std::array<std::vector<float>, 3> place;
+
+  void Clear()
+  {
+    this->triangle.clear();
+    this->distance.clear();
+    this->speed.clear();
+    this->passed.clear();
+    for (std::vector<float>& one : this->place)
+    {
+      one.clear();
+    }
+  }
+  void Add(std::int32_t number, float far, float fast)
+  {
+    this->triangle.push_back(number);
+    this->distance.push_back(far);
+    this->speed.push_back(fast);
+    this->passed.push_back(0.0f);
+    for (std::vector<float>& one : this->place)
+    {
+      one.push_back(0.0f);
+    }
+  }
 };
 
 /// What is kept for a sample. The path is that of a point that moves with the wall next to the sample.
@@ -84,7 +107,7 @@ struct WallMemory
   Vector3 velocity = Vector3::Zero();
   double radius = 0.0;    ///< mm of the path in which all triangles are known
   double clearance = 0.0; ///< mm of the path in which there is none
-  std::vector<WallCandidate> list;
+  WallCandidates list;
 
   // Where its distance was known last, and how far from the wall it was at least: a sample that is inside by more
   // than it has moved can not have come to be outside.
@@ -164,9 +187,11 @@ struct VesselWall::Internals
 
   // Of the evaluation that was last.
   std::vector<WallHit> Hits;
+  std::vector<Candidate> Sifted;
+  std::vector<std::int32_t> Now;   ///< candidates that are looked at
+  TriangleBatch Batch{};           ///< of these
   std::vector<std::int32_t> Later; ///< candidates within range that do not turn the first plane
-  float Passed = 0.0f;             ///< s since triangles were looked up
-  float Offset[3] = { 0.0f, 0.0f, 0.0f };
+  CandidateRun Run;
   std::vector<Vector3> AllPoints;
   std::vector<Vector3> AllNormals;
 
@@ -404,7 +429,12 @@ struct VesselWall::Internals
   /// The nearest places of all triangles that matter; false if there is no wall within `range` (and then
   /// the side is the one that it was).
   bool Evaluate(WallMemory& memory, const Vector3& p, double range, WallHit& nearest);
-  WallHit Look(WallCandidate& candidate, const Vector3& p) const;
+  /// Which candidates are looked at now, and which may be later.
+  void Sift(const WallMemory& memory);
+  /// Where these candidates are nearest now. @param visit  gets of each its distance, rounded down, and its place
+  template <typename Visit>
+  void Look(WallMemory& memory, const Vector3& p, const std::vector<std::int32_t>& which,
+    const Visit& visit);
   /// Adds the hits within range that may be of another side than `first`.
   void EvaluateLater(WallMemory& memory, const Vector3& p, double range, const Vector3* first);
   /// @param first  normal of the plane that this one is another side of; null: there is none

@@ -70,7 +70,7 @@ BENCHMARK(Tick)
   ->MinTime(2.0)
   ->Unit(benchmark::kMicrosecond);
 
-// Two wires in the vessel, the first one with a balloon (1) or without (0); the other one is held.
+// Two wires in the vessel, the first one with a balloon (1: folded; 2: open) or without (0); the other one is held.
 void TwoWires(benchmark::State& state)
 {
   const Scenario scenario = LoadScenario("lad-bifurcation");
@@ -95,6 +95,11 @@ void TwoWires(benchmark::State& state)
     input.balloonPosition += 55.0 / 4000.0;
     intervention.Step(input);
   }
+  input.inflation = state.range(1) > 1 ? 8.0 : 0.0;
+  for (int k = 0; k < 8000 && carries; ++k)
+  {
+    intervention.Step(input);
+  }
   long k = 0;
   for (auto _ : state)
   {
@@ -105,12 +110,14 @@ void TwoWires(benchmark::State& state)
   state.counters["segments"] = static_cast<double>(intervention.NumberOfSegments());
   state.counters["beyond"] = intervention.Report().wires[1].inserted;
   state.counters["balloon"] = intervention.Report().balloon.tip;
+  state.counters["atm"] = intervention.Report().balloon.pressure;
 }
 BENCHMARK(TwoWires)
   ->ArgNames({ "mm", "balloon" })
   ->Args({ 60, 0 })
   ->Args({ 100, 0 })
   ->Args({ 100, 1 })
+  ->Args({ 100, 2 })
   ->MinTime(2.0)
   ->Unit(benchmark::kMicrosecond);
 

@@ -1,8 +1,11 @@
 // The moving wall against what is known of tubes, and against a search through all triangles.
 
+#include "KernelChoice.h"
+#include "NearestOnTriangle.h"
 #include "Refusals.h"
 #include "TriangleBvh.h"
 #include "VesselWall.h"
+#include "WallKernels.h"
 #include "WallTestMeshes.h"
 
 #include <gtest/gtest.h>
@@ -549,6 +552,63 @@ TEST(VesselWall, OrderOfCallsChangesNothing)
         }
       }
     }
+  }
+}
+
+TEST(VesselWall, LoopOverTrianglesFindsTheNearestPlaces)
+{
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  const auto anywhere = [&] { return Vector3(unit(random), unit(random), unit(random)); };
+  const auto isFlat = [](int i) { return i % 11 == 3; };
+  std::array<int, 7> features{};
+  for (int round = 0; round < 2000; ++round)
+  {
+    std::array<std::array<Vector3, 3>, TriangleBatch::Size> triangles;
+    TriangleBatch batch{};
+    const Vector3 p = 2.0 * anywhere();
+    const int count = 1 + round % TriangleBatch::Size;
+    for (int i = 0; i < count; ++i)
+    {
+      std::array<Vector3, 3>& t = triangles[i];
+      t = { anywhere(), anywhere(), anywhere() };
+      t[2] = isFlat(i) ? Vector3(0.5 * (t[0] + t[1])) : t[2];
+      for (int k = 0; k < 9; ++k)
+      {
+        batch.corner[k][i] = t[k / 3][k % 3];
+      }
+    }
+    TriangleBatch wide = batch;
+    WallKernelsBaseline.nearest(batch, count, p.data());
+    WallKernelChoice().Get().nearest(wide, count, p.data());
+    for (int i = 0; i < count; ++i)
+    {
+      ASSERT_EQ(wide.feature[i], batch.feature[i]);
+      ASSERT_EQ(batch.feature[i] < 0.0, isFlat(i));
+      if (isFlat(i))
+      {
+        continue;
+      }
+      ASSERT_EQ(wide.b[i], batch.b[i]);
+      ASSERT_EQ(wide.c[i], batch.c[i]);
+      ASSERT_EQ(wide.squaredDistance[i], batch.squaredDistance[i]);
+      const TrianglePoint on =
+        NearestOnTriangle(p, triangles[i][0], triangles[i][1], triangles[i][2]);
+      ++features[static_cast<int>(on.feature)];
+      ASSERT_EQ(batch.feature[i], static_cast<int>(on.feature));
+      ASSERT_NEAR(batch.b[i], on.b, 1e-9);
+      ASSERT_NEAR(batch.c[i], on.c, 1e-9);
+      ASSERT_NEAR(batch.squaredDistance[i], on.squaredDistance, 1e-12);
+      for (int k = 0; k < 3; ++k)
+      {
+        ASSERT_EQ(wide.point[k][i], batch.point[k][i]);
+        ASSERT_NEAR(batch.point[k][i], on.point[k], 1e-12);
+      }
+    }
+  }
+  for (const int times : features)
+  {
+    EXPECT_GT(times, 100);
   }
 }
 
