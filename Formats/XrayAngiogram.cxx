@@ -240,6 +240,15 @@ void AddAcquisition(DataSetWriter& data, const XrayAngiogram& run)
   data.Text(0x0018, 0x1155, VR::CS, "GR");
   data.Text(0x0018, 0x115e, VR::DS, Decimal(DecigrayPerGray * run.areaDose));
   data.Decimals(0x0018, 0x1164, { run.height / run.rows, run.width / run.columns });
+  if (run.shutterLeft + run.shutterRight + run.shutterTop + run.shutterBottom > 0)
+  {
+    // The edges' own column or row, counted from 1.
+    data.Text(0x0018, 0x1700, VR::CS, "RECTANGULAR");
+    data.Text(0x0018, 0x1702, VR::IS, std::to_string(run.shutterLeft));
+    data.Text(0x0018, 0x1704, VR::IS, std::to_string(run.columns + 1 - run.shutterRight));
+    data.Text(0x0018, 0x1706, VR::IS, std::to_string(run.shutterTop));
+    data.Text(0x0018, 0x1708, VR::IS, std::to_string(run.rows + 1 - run.shutterBottom));
+  }
   const bool turns = AnyFrame(run,
     [&](const XrayAngiogram::Frame& frame)
     {

@@ -7,6 +7,7 @@
 
 #include "Geometry.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -24,6 +25,8 @@ struct XrayAngiogram
     Vector3 isocentre{ 0.0, 0.0, 0.0 }; ///< where in the patient, mm
     double seconds = 0.0;               ///< since the session began
     bool afterRWave = false;            ///< the first one after an R wave
+    /// Column and row of both markers of a balloon, pixels; empty: it has none in the image. No file has them.
+    std::vector<std::array<double, 2>> markers;
   };
 
   std::string patient; ///< a name; the file says that the images are simulated
@@ -35,8 +38,15 @@ struct XrayAngiogram
   int part = 1; ///< of a run that is too long for one file
   int columns = 0;
   int rows = 0;
-  double width = 0.0;             ///< of the detector, mm, of all columns
-  double height = 0.0;            ///< mm
+  double width = 0.0;  ///< of the detector, mm, of all columns
+  double height = 0.0; ///< mm
+  ///@{
+  /// Columns and rows that the shutters cover, from each border.
+  int shutterLeft = 0;
+  int shutterRight = 0;
+  int shutterTop = 0;
+  int shutterBottom = 0;
+  ///@}
   double frameRate = 15.0;        ///< Hz
   double sourceToDetector = 0.0;  ///< mm
   double sourceToIsocentre = 0.0; ///< mm

@@ -45,8 +45,8 @@ public:
 
   std::size_t Frames() const;
   const std::string& FrameTable() const; ///< CSV of the frames
-  /// Of each cine run the frame with the most contrast medium in the vessels.
-  std::vector<ReportPicture> BestFrames() const;
+  /// Of each cine run the frame with the most contrast medium in the vessels, and its stent boost.
+  std::vector<ReportPicture> PicturesOfRuns() const;
 
 private:
   struct Internals;

@@ -290,7 +290,7 @@ public:
       this->Curves.erase(this->Curves.begin() + BalloonCurve);
     }
     WriteFileAtomically(this->Folder->Add("report.html"),
-      ReportPage(statistics, this->Seconds, this->Curves, pictures.BestFrames()));
+      ReportPage(statistics, this->Seconds, this->Curves, pictures.PicturesOfRuns()));
     WriteFileAtomically(this->Folder->Add("contrast.csv"), this->Flows);
     if (this->HasBalloon)
     {
@@ -805,29 +805,14 @@ namespace
 {
 Json NameOfEvent(std::uint8_t kind)
 {
-  switch (kind)
+  for (const EventMember& member : EventMembers)
   {
-    case RecordedEvent::HeartRate:
-      return "heart_rate_bpm";
-    case RecordedEvent::FrameRate:
-      return "frame_rate_hz";
-    case RecordedEvent::FieldOfView:
-      return "field_of_view_mm";
-    case RecordedEvent::Exchange:
-      return "balloon_number";
-    case RecordedEvent::ExchangeWire:
-      return "wire_number";
-    case RecordedEvent::Breaths:
-      return "breaths_per_min";
-    case RecordedEvent::Flush:
-      return "flush_mL";
-    case RecordedEvent::Incident:
-      return "event_number";
-    case RecordedEvent::TakeWire:
-      return "wire_in_hand";
-    default:
-      return static_cast<int>(kind);
+    if (member.kind == kind)
+    {
+      return member.name;
+    }
   }
+  return static_cast<int>(kind);
 }
 }
 

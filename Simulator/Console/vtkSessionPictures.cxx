@@ -4,6 +4,7 @@
 #include "HeartShell.h"
 #include "Numbers.h"
 #include "SessionImager.h"
+#include "StentEnhancement.h"
 #include "vtkDisplay.h"
 #include "vtkPictureCanvas.h"
 #include "vtkScenePicture.h"
@@ -49,6 +50,7 @@ struct SessionPictures::Internals
     ReportPicture picture;
   };
   std::map<std::int64_t, Best> BestOfRuns;
+  std::vector<ReportPicture> Boosts;
   SessionSnapshot Moment;
   std::size_t Frames = 0;
   std::size_t Scenes = 0;
@@ -90,6 +92,14 @@ void SessionPictures::Internals::WriteRuns(bool all, const FolderCallback& folde
   for (XrayAngiogram& run : this->Runs->Take(all))
   {
     const std::string name = NameOfCineFile(run);
+    if (const EnhancedStent stent = EnhanceStent(run); stent.frames > 0)
+    {
+      const std::string picture = "boost" + name.substr(4, name.size() - 7) + "png";
+      WriteGrey(stent.image, folder(picture));
+      this->Boosts.push_back({ picture,
+        "Run " + std::to_string(run.run) + ", stent boost of " + std::to_string(stent.frames) +
+          " frames" });
+    }
     WriteXrayAngiogram(std::move(run), folder(name));
   }
 }
@@ -170,13 +180,14 @@ std::size_t SessionPictures::Frames() const
   return this->Data->Frames;
 }
 
-std::vector<ReportPicture> SessionPictures::BestFrames() const
+std::vector<ReportPicture> SessionPictures::PicturesOfRuns() const
 {
   std::vector<ReportPicture> pictures;
   for (const auto& [run, best] : this->Data->BestOfRuns)
   {
     pictures.push_back(best.picture);
   }
+  pictures.insert(pictures.end(), this->Data->Boosts.begin(), this->Data->Boosts.end());
   return pictures;
 }
 

@@ -35,6 +35,13 @@ struct Collimation
   double bottom = 0.0;
   double transmission = 0.002; ///< of the blades, 0 to 1
 
+  bool operator==(const Collimation& other) const
+  {
+    return this->left == other.left && this->right == other.right && this->top == other.top &&
+      this->bottom == other.bottom && this->transmission == other.transmission;
+  }
+  bool operator!=(const Collimation& other) const { return !(*this == other); }
+
   /// Share of the image that is not covered.
   double OpenFraction() const
   {

@@ -14,11 +14,7 @@ namespace
 {
 constexpr std::size_t MostPieces = 100000;
 constexpr double LongestPiece = 36000.0; // s
-constexpr double MaximumHeartRate = 240.0;
-constexpr double MaximumBreaths = 60.0; // a minute
-constexpr std::int64_t MostExchanges = 100;
-constexpr double MostFlush = 50.0;    // mL
-constexpr double FurthestOfOld = 1e6; // mm, degrees, mL
+constexpr double FurthestOfOld = 1e6;    // mm, degrees, mL
 
 std::uint32_t PedalsOf(JsonFields& fields)
 {
@@ -64,20 +60,17 @@ DrivePiece PieceOf(JsonFields& member, PiecesOf form)
   const bool hasPedals = member.Has("pedals");
   piece.setsPedals = hasPedals || form == PiecesOf::OldDevice;
   piece.pedals = hasPedals ? PedalsOf(member) : 0U;
-  piece.setsHeartRate = member.Has("heart_rate_bpm");
-  piece.heartRate = member.Number("heart_rate_bpm", 0.0, MaximumHeartRate, 0.0);
-  piece.exchanges = member.Has("exchange");
-  piece.exchange = static_cast<double>(member.Whole("exchange", 0, MostExchanges, 0));
-  piece.exchangesWire = member.Has("exchange_wire");
-  piece.wire = static_cast<double>(member.Whole("exchange_wire", 0, MostExchanges, 0));
-  piece.takesWire = member.Has("take_wire");
-  piece.hand = static_cast<double>(member.Whole("take_wire", 0, 1, 0));
-  piece.setsBreaths = member.Has("breaths_per_min");
-  piece.breaths = member.Number("breaths_per_min", 0.0, MaximumBreaths, 0.0);
-  piece.flushes = member.Has("flush_mL");
-  piece.flush = member.Number("flush_mL", -MostFlush, MostFlush, 0.0);
-  piece.callsIncident = member.Has("event");
-  piece.incident = static_cast<double>(member.Whole("event", 0, MostExchanges, 0));
+  for (const EventMember& event : EventMembers)
+  {
+    if (member.Has(event.name))
+    {
+      piece.events.push_back({ event.kind,
+        event.whole
+          ? static_cast<double>(member.Whole(event.name, static_cast<std::int64_t>(event.least),
+              static_cast<std::int64_t>(event.most), 0))
+          : member.Number(event.name, event.least, event.most) });
+    }
+  }
   member.Done();
   return piece;
 }
@@ -139,60 +132,18 @@ SessionInput DriveScript::At(double seconds, const SessionInput& start) const
   return input;
 }
 
-std::vector<double> DriveScript::Chosen(
-  double from, double to, bool DrivePiece::*chooses, double DrivePiece::*value) const
+std::vector<RecordedEvent> DriveScript::Events(double from, double to) const
 {
-  std::vector<double> chosen;
+  std::vector<RecordedEvent> events;
   const auto first = std::lower_bound(this->Starts.begin(), this->Starts.end(), from,
     [](const Start& start, double time) { return start.time < time; });
-  for (auto n = static_cast<std::size_t>(first - this->Starts.begin()); n < this->Pieces.size();
-       ++n)
+  for (auto n = static_cast<std::size_t>(first - this->Starts.begin());
+       n < this->Pieces.size() && this->Starts[n].time < to; ++n)
   {
-    if (this->Starts[n].time >= to)
-    {
-      break;
-    }
-    if (this->Pieces[n].*chooses)
-    {
-      chosen.push_back(this->Pieces[n].*value);
-    }
+    const std::vector<RecordedEvent>& own = this->Pieces[n].events;
+    events.insert(events.end(), own.begin(), own.end());
   }
-  return chosen;
-}
-
-std::vector<double> DriveScript::HeartRates(double from, double to) const
-{
-  return this->Chosen(from, to, &DrivePiece::setsHeartRate, &DrivePiece::heartRate);
-}
-
-std::vector<double> DriveScript::Exchanges(double from, double to) const
-{
-  return this->Chosen(from, to, &DrivePiece::exchanges, &DrivePiece::exchange);
-}
-
-std::vector<double> DriveScript::WireExchanges(double from, double to) const
-{
-  return this->Chosen(from, to, &DrivePiece::exchangesWire, &DrivePiece::wire);
-}
-
-std::vector<double> DriveScript::WiresTaken(double from, double to) const
-{
-  return this->Chosen(from, to, &DrivePiece::takesWire, &DrivePiece::hand);
-}
-
-std::vector<double> DriveScript::BreathRates(double from, double to) const
-{
-  return this->Chosen(from, to, &DrivePiece::setsBreaths, &DrivePiece::breaths);
-}
-
-std::vector<double> DriveScript::Flushes(double from, double to) const
-{
-  return this->Chosen(from, to, &DrivePiece::flushes, &DrivePiece::flush);
-}
-
-std::vector<double> DriveScript::Incidents(double from, double to) const
-{
-  return this->Chosen(from, to, &DrivePiece::callsIncident, &DrivePiece::incident);
+  return events;
 }
 
 DriveScript DriveScriptOf(JsonFields& fields, PiecesOf form)

@@ -4,15 +4,15 @@
 #include "Numbers.h"
 #include "SessionImager.h"
 
+#include <cmath>
 #include <cstdio>
 #include <utility>
 
 namespace coronary
 {
 CineRuns::CineRuns(const Scenario& scenario, std::string program, std::size_t memory)
-  : Patient(scenario.name)
+  : Scenario_(scenario)
   , Program(std::move(program))
-  , Iodine(scenario.imaging.iodine)
   , Memory(memory)
 {
   const std::string text = ScenarioText(scenario);
@@ -34,7 +34,7 @@ void CineRuns::Add(const SessionSnapshot& moment, const GreyImage& image, ImageM
   const bool goesOn = last && moment.exposure.run == this->LastRun &&
     moment.fieldOfView == last->width && last->columns == image.columns &&
     last->rows == image.rows && last->subtracted == subtracted &&
-    last->sourceToDetector == moment.pose.sourceToDetector;
+    last->sourceToDetector == moment.pose.sourceToDetector && this->LastShutters == moment.shutters;
   if (!goesOn)
   {
     this->Begin(moment, image, subtracted);
@@ -48,6 +48,13 @@ void CineRuns::Add(const SessionSnapshot& moment, const GreyImage& image, ImageM
   frame.seconds = moment.seconds;
   frame.afterRWave = goesOn && moment.report.phase < this->LastPhase;
   this->LastPhase = moment.report.phase;
+  const CArmGeometry geometry =
+    GeometryOfHeart(moment, { run.columns, run.rows, run.width, run.height });
+  for (const Vector3& marker : BalloonMarkers(moment, this->Scenario_))
+  {
+    const Vector3 place = geometry.Project(marker);
+    frame.markers.push_back({ place.x(), place.y() });
+  }
   run.areaDose += dose;
   run.contrast = moment.contrast.injected;
   run.frames.push_back(std::move(frame));
@@ -65,7 +72,7 @@ void CineRuns::Begin(const SessionSnapshot& moment, const GreyImage& image, bool
     this->StudyIsKnown = true;
   }
   XrayAngiogram run;
-  run.patient = this->Patient;
+  run.patient = this->Scenario_.name;
   run.view = ViewName(moment.pose);
   run.program = this->Program;
   run.study = this->Study;
@@ -79,7 +86,14 @@ void CineRuns::Begin(const SessionSnapshot& moment, const GreyImage& image, bool
   run.sourceToDetector = moment.pose.sourceToDetector;
   run.sourceToIsocentre = moment.pose.sourceToIsocentre;
   run.subtracted = subtracted;
-  run.iodine = this->Iodine;
+  const auto covered = [](double share, int whole)
+  { return static_cast<int>(std::lround(share * whole)); };
+  run.shutterLeft = covered(moment.shutters.left, run.columns);
+  run.shutterRight = covered(moment.shutters.right, run.columns);
+  run.shutterTop = covered(moment.shutters.top, run.rows);
+  run.shutterBottom = covered(moment.shutters.bottom, run.rows);
+  this->LastShutters = moment.shutters;
+  run.iodine = this->Scenario_.imaging.iodine;
   this->LastRun = moment.exposure.run;
   this->LastPart = run.part;
   this->Runs_.push_back(std::move(run));

@@ -44,9 +44,9 @@ private:
   void Begin(const SessionSnapshot& moment, const GreyImage& image, bool subtracted);
   void KeepWithinMemory();
 
-  std::string Patient;
+  Scenario Scenario_;
+  Collimation LastShutters;
   std::string Program;
-  double Iodine; ///< mg/mL
   std::size_t Memory;
   std::uint64_t Study;
   bool StudyIsKnown = false;

@@ -36,7 +36,8 @@
  *   fluoroscopy; 3: field of view, mm; 4: number of the balloon that is taken, 0 the scenario's
  *   first; 5: that of the wire, likewise; 6: breaths a minute, 0: the breath is held; 7: which of
  *   two wires the hand is on from now on, 0 or 1; 8: mL of saline through the guide, negative:
- *   drawn back; 9: number of the scenario's event, 0: nitrates
+ *   drawn back; 9: number of the scenario's event, 0: nitrates; 10: share of the image that the left
+ *   and the right shutter cover each; 11: the upper and the lower one
  * - 4 state hash: 8 bytes, FNV-1a of the instruments' state, and of contrast medium and exposures
  *   once there have been any; every 1000 ticks and at the end
  * - 5 image hash: 8 bytes, FNV-1a of an X-ray image's size and pixels; written with `--xray`
@@ -51,6 +52,7 @@
 #define DynamicCoronary_Recording_h
 
 #include "Fnv1a.h"
+#include "RecordedEvent.h"
 #include "SessionInput.h"
 
 #include <array>
@@ -97,26 +99,6 @@ struct RecordedForces
   float proximalTorque = 0.0F; ///< N mm
   float tipForce = 0.0F;       ///< N
   float maximumForce = 0.0F;   ///< N
-};
-
-/// What the user did beside driving.
-struct RecordedEvent
-{
-  enum Kind : std::uint8_t
-  {
-    HeartRate = 1,    ///< value: beats a minute
-    FrameRate = 2,    ///< frames a second of the X-ray images: 7.5, 15 or 30
-    FieldOfView = 3,  ///< mm of the detector that are used, across
-    Exchange = 4,     ///< number of the balloon that is taken, as BalloonOf
-    ExchangeWire = 5, ///< number of the wire that is taken, as WireOf
-    Breaths = 6,      ///< a minute; 0: the breath is held where it is
-    TakeWire = 7,     ///< the hand goes to this wire: 0 the first, 1 the second
-    Flush = 8,        ///< mL of saline pushed through the guide catheter; negative: drawn back
-    Incident =
-      9 ///< number of the scenario's event that happens now, from 1 on; 0: nitrates are given
-  };
-  std::uint8_t kind = 0;
-  double value = 0.0;
 };
 
 constexpr std::uint64_t RecordedHashInterval = 1000; ///< ticks between state hashes

@@ -68,7 +68,7 @@ private:
     this->Raw = this->Mux->Next(this->Tick, 1.0 / this->Rate);
     ++this->Tick;
     const double end = static_cast<double>(this->Tick) / this->Rate;
-    const std::vector<RecordedEvent> chosen = EventsOf(this->Script, begin, end);
+    const std::vector<RecordedEvent> chosen = this->Script.Events(begin, end);
     this->Waiting.insert(this->Waiting.end(), chosen.begin(), chosen.end());
     if (events)
     {

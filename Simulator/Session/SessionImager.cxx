@@ -310,12 +310,15 @@ void SessionImager::Aim(const CArmPose& pose, double fieldOfView)
 
 const GreyImage& SessionImager::Expose(const SessionSnapshot& snapshot)
 {
+  if (this->Images_.Settings().detector.shutters != snapshot.shutters)
+  {
+    ImagerSettings settings = this->Images_.Settings();
+    settings.detector.shutters = snapshot.shutters;
+    this->Images_.SetSettings(settings);
+  }
   const CArmGeometry geometry = this->GeometryOf(snapshot.pose, snapshot.fieldOfView);
   this->Background->SetGeometry(geometry);
-  // The heart and all that is in its vessels moves as a whole: as if the C-arm moved the other way.
-  CArmPose pose = geometry.Pose();
-  pose.isocentre -= HeartShift(snapshot.diaphragm);
-  const CArmGeometry ofHeart(pose, geometry.Format());
+  const CArmGeometry ofHeart = GeometryOfHeart(snapshot, geometry.Format());
   this->ProjectInstruments(snapshot, ofHeart);
   this->ProjectContrast(snapshot, ofHeart);
   this->MoveBackground(snapshot, geometry);
@@ -478,6 +481,38 @@ void SessionImager::ProjectStents(const SessionSnapshot& snapshot, const CArmGeo
     }
     AddInstrument(tube, geometry, this->InstrumentLayer);
   }
+}
+
+CArmGeometry GeometryOfHeart(const SessionSnapshot& snapshot, const DetectorFormat& format)
+{
+  CArmPose pose = snapshot.pose;
+  pose.isocentre -= HeartShift(snapshot.diaphragm);
+  return { pose, format };
+}
+
+std::vector<Vector3> BalloonMarkers(const SessionSnapshot& snapshot, const Scenario& scenario)
+{
+  std::vector<Vector3> markers;
+  if (snapshot.balloon.size() < 2)
+  {
+    return markers;
+  }
+  const BalloonCatheter& balloon = *BalloonOf(scenario, snapshot.balloonNumber);
+  for (const double place : { balloon.tipLength, balloon.tipLength + balloon.length })
+  {
+    double behind = 0.0;
+    for (std::size_t n = 0; n + 1 < snapshot.balloon.size(); ++n)
+    {
+      const Vector3 piece = snapshot.balloon[n + 1] - snapshot.balloon[n];
+      const double length = piece.norm();
+      if (place >= behind && place < behind + length)
+      {
+        markers.push_back(snapshot.balloon[n] + (place - behind) / length * piece);
+      }
+      behind += length;
+    }
+  }
+  return markers;
 }
 
 InstrumentChain SessionImager::WireOf(

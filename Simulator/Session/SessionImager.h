@@ -61,6 +61,12 @@ std::shared_ptr<const MovingParts> MovingPartsOf(const HounsfieldVolume& backgro
 std::shared_ptr<const VolumeProjector> MeasuredThorax(
   const Scenario& scenario, const WallTopology& topology);
 
+/// The heart and all that is in its vessels moves with the breath as a whole: as if the C-arm moved the other way.
+CArmGeometry GeometryOfHeart(const SessionSnapshot& snapshot, const DetectorFormat& format);
+
+/// The middles of the balloon's markers, from its tip on, mm: two, or fewer where the rest lies in the guide catheter.
+std::vector<Vector3> BalloonMarkers(const SessionSnapshot& snapshot, const Scenario& scenario);
+
 /**
  * Background, instruments and contrast medium are line integrals of their own and are added before the exponential.
  * Used by one thread.

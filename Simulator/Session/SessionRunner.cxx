@@ -12,40 +12,6 @@ constexpr std::uint64_t ForceInterval = 40; // ticks between recorded forces: 50
 constexpr double Nothing = std::numeric_limits<double>::quiet_NaN();
 }
 
-std::vector<RecordedEvent> EventsOf(const DriveScript& script, double from, double to)
-{
-  std::vector<RecordedEvent> events;
-  for (const double heartRate : script.HeartRates(from, to))
-  {
-    events.push_back({ RecordedEvent::HeartRate, heartRate });
-  }
-  for (const double number : script.WiresTaken(from, to))
-  {
-    events.push_back({ RecordedEvent::TakeWire, number });
-  }
-  for (const double number : script.Exchanges(from, to))
-  {
-    events.push_back({ RecordedEvent::Exchange, number });
-  }
-  for (const double number : script.WireExchanges(from, to))
-  {
-    events.push_back({ RecordedEvent::ExchangeWire, number });
-  }
-  for (const double rate : script.BreathRates(from, to))
-  {
-    events.push_back({ RecordedEvent::Breaths, rate });
-  }
-  for (const double volume : script.Flushes(from, to))
-  {
-    events.push_back({ RecordedEvent::Flush, volume });
-  }
-  for (const double number : script.Incidents(from, to))
-  {
-    events.push_back({ RecordedEvent::Incident, number });
-  }
-  return events;
-}
-
 bool ReplaySource::At(std::uint64_t tick, SessionInput& input, std::vector<RecordedEvent>& events)
 {
   const bool goesOn = this->Replay.At(tick, input, this->Recorded);
@@ -73,7 +39,7 @@ bool ScriptSource::At(std::uint64_t tick, SessionInput& input, std::vector<Recor
   const double begin = static_cast<double>(tick) / this->Rate;
   const double end = static_cast<double>(tick + 1) / this->Rate;
   input = this->Script.At(end, this->Start);
-  const std::vector<RecordedEvent> chosen = EventsOf(this->Script, begin, end);
+  const std::vector<RecordedEvent> chosen = this->Script.Events(begin, end);
   events.insert(events.end(), chosen.begin(), chosen.end());
   return this->Endless || tick < this->Script.Ticks(this->Rate);
 }

@@ -19,9 +19,6 @@
 
 namespace coronary
 {
-/// What a script chooses at or after `from` and before `to`, s.
-std::vector<RecordedEvent> EventsOf(const DriveScript& script, double from, double to);
-
 /// Where the hands' movements come from.
 class TickSource
 {

@@ -22,13 +22,10 @@ namespace
 constexpr double ContrastStep = 0.005;    // s
 constexpr double GoalStep = 0.05;         // s
 constexpr double FlushSpeed = 3.0;        // mL/s
-constexpr double MostFlush = 50.0;        // mL
 constexpr double FastestInjection = 12.0; // mL/s: no hand and no injector of a laboratory does more
 constexpr double NearestDetector = 50.0;  // mm behind the isocentre
 constexpr double FurthestDetector = 1500.0; // mm from the source
 constexpr double FurthestTable = 500.0;     // mm
-constexpr double MinimumField = 80.0;       // mm
-constexpr double MaximumField = 400.0;      // mm
 
 constexpr double PlacedFor = 0.3; // s that a guide has to lie so, to be told
 
@@ -207,6 +204,7 @@ struct TrainingSession::Internals
   std::uint64_t TicksOfContrast;
   std::uint64_t TicksOfProcedure;
   double Field;
+  Collimation Shutters;
   double GuideRadius;              // mm, of its lumen
   std::optional<GuideLumen> Guide; // none: it is as if it were without volume
   bool GuideUsed = false;          // something was pushed or drawn
@@ -232,7 +230,7 @@ DetectorFormat TrainingSession::Internals::Format() const
 
 void TrainingSession::Internals::SetField()
 {
-  this->Clock.SetFieldArea(ReferenceFieldArea(this->Pose, this->Format()));
+  this->Clock.SetFieldArea(ReferenceFieldArea(this->Pose, this->Format(), this->Shutters));
 }
 
 /// Looks through the patient when a frame is due from another view than the last one's.
@@ -508,7 +506,7 @@ bool TrainingSession::Internals::Flush(double volume)
       "The guide catheter has no volume in this scenario: it cannot be flushed.");
     return false;
   }
-  this->Flushing = std::clamp(volume, -MostFlush, MostFlush);
+  this->Flushing = volume;
   return true;
 }
 
@@ -775,10 +773,15 @@ bool TrainingSession::Apply(const RecordedEvent& event)
   {
     return false;
   }
+  double value = event.value;
+  for (const EventMember& member : EventMembers)
+  {
+    value = member.kind == event.kind ? std::clamp(value, member.least, member.most) : value;
+  }
   switch (event.kind)
   {
     case RecordedEvent::HeartRate:
-      data.HeartRate = std::clamp(event.value, 0.0, 240.0);
+      data.HeartRate = value;
       data.Physics.SetHeartRate(data.HeartRate);
       return true;
     case RecordedEvent::FrameRate:
@@ -789,7 +792,7 @@ bool TrainingSession::Apply(const RecordedEvent& event)
       data.Clock.SetFluoroscopyRate(FrameRateOf(event.value));
       return true;
     case RecordedEvent::FieldOfView:
-      data.Field = std::clamp(event.value, MinimumField, MaximumField);
+      data.Field = value;
       data.SetField();
       return true;
     case RecordedEvent::Exchange:
@@ -799,11 +802,19 @@ bool TrainingSession::Apply(const RecordedEvent& event)
     case RecordedEvent::TakeWire:
       return data.TakeWire(event.value);
     case RecordedEvent::Flush:
-      return data.Flush(event.value);
+      return data.Flush(value);
+    case RecordedEvent::ShutterSides:
+      data.Shutters.left = data.Shutters.right = value;
+      data.SetField();
+      return true;
+    case RecordedEvent::ShutterEnds:
+      data.Shutters.top = data.Shutters.bottom = value;
+      data.SetField();
+      return true;
     case RecordedEvent::Incident:
       return data.Call(event.value);
     case RecordedEvent::Breaths:
-      data.Breath.SetRate(std::clamp(event.value, 0.0, Breathing::FastestRate));
+      data.Breath.SetRate(value);
       return true;
     default:
       return false;
@@ -941,6 +952,7 @@ void TrainingSession::SnapshotOfImage(SessionSnapshot& snapshot) const
   snapshot.input = data.Last;
   snapshot.pose = data.Pose;
   snapshot.fieldOfView = data.Field;
+  snapshot.shutters = data.Shutters;
   snapshot.frameRate = FramesPerSecond(data.Clock.Settings().fluoroscopyRate);
   snapshot.diaphragm = data.Breath.Diaphragm();
   snapshot.radiating = data.Clock.Radiating();

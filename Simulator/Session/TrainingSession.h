@@ -49,8 +49,9 @@ struct SessionSnapshot
   SessionInput input;
   CArmPose pose;
   double fieldOfView = 0.0; ///< mm
-  double frameRate = 0.0;   ///< Hz, of fluoroscopy
-  double diaphragm = 0.0;   ///< mm below its place at the end of expiration
+  Collimation shutters;
+  double frameRate = 0.0; ///< Hz, of fluoroscopy
+  double diaphragm = 0.0; ///< mm below its place at the end of expiration
   bool radiating = false;
   Exposure exposure;                   ///< the last one
   std::size_t wireNumber = 0;          ///< as WireOf

@@ -4,11 +4,16 @@
 
 #include <QFormLayout>
 #include <QHBoxLayout>
+#include <QSignalBlocker>
+
+#include <utility>
 
 namespace coronary
 {
 namespace
 {
+constexpr int MostShutter = 45; // percent
+
 QString RateText(double rate)
 {
   return QString("%1 frames/s").arg(rate);
@@ -57,6 +62,18 @@ XRayPanel::XRayPanel()
   form->addRow("Rate", this->Rates);
   form->addRow("Image", this->Modes);
   form->addRow("Field", this->Fields);
+  auto* shutters = new QHBoxLayout;
+  for (const auto& [slider, kind] : { std::pair(this->Sides, RecordedEvent::ShutterSides),
+         std::pair(this->Ends, RecordedEvent::ShutterEnds) })
+  {
+    slider->setMaximum(MostShutter);
+    shutters->addWidget(slider);
+    QObject::connect(slider, &QSlider::valueChanged,
+      [this, kind = kind](int percent) {
+        this->chosen({ kind, 0.01 * percent });
+      });
+  }
+  form->addRow("Shutters", shutters);
   this->Offer(*this->Rates, RecordedEvent::FrameRate);
   this->Offer(*this->Fields, RecordedEvent::FieldOfView);
   QObject::connect(this->Modes, QOverload<int>::of(&QComboBox::activated),
@@ -69,6 +86,9 @@ XRayPanel::XRayPanel()
   }
   form->addRow("Cine run", this->Runs);
   form->addRow("Frame", this->Frames);
+  form->addRow(this->Enhance);
+  this->Enhance->setToolTip("The run's frames, laid over each other by the balloon's markers");
+  QObject::connect(this->Enhance, &QCheckBox::toggled, [this](bool) { this->frameChosen(); });
 }
 
 void XRayPanel::Offer(QComboBox& box, RecordedEvent::Kind kind)
@@ -81,6 +101,11 @@ void XRayPanel::Offer(QComboBox& box, RecordedEvent::Kind kind)
 
 void XRayPanel::ShowScenario(const ImagingSettings& imaging)
 {
+  for (QSlider* slider : { this->Sides, this->Ends })
+  {
+    const QSignalBlocker silence(slider); // a session begins without shutters
+    slider->setValue(0);
+  }
   Choose(*this->Rates, RateText(imaging.frameRate), imaging.frameRate);
   Choose(*this->Fields, FieldText(imaging.fieldOfView), imaging.fieldOfView);
 }

@@ -70,6 +70,7 @@ private:
   void ShowDevices();
   void ShowRates();
   void ShowCine();
+  void ShowEnhancedStent(std::size_t number); ///< of a run
   void SaveCine();
   void ShowKeys();
 

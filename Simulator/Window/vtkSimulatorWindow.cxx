@@ -7,6 +7,7 @@
 #include "Interruption.h"
 #include "Program.h"
 #include "RecordedDevices.h"
+#include "StentEnhancement.h"
 #include "vtkAnatomyPanel.h"
 #include "vtkLoadingWindow.h"
 #include "vtkWindowProgram.h"
@@ -634,6 +635,11 @@ void SessionWindow::ShowCine()
   const std::size_t run = this->XRay->Run();
   this->Engine->CineFrame(run, SIZE_MAX, image, runs, frames);
   this->XRay->SetFrames(frames);
+  if (this->XRay->Enhances())
+  {
+    this->ShowEnhancedStent(run);
+    return;
+  }
   const std::size_t frame = this->XRay->Frame();
   if (this->Engine->CineFrame(run, frame, image, runs, frames))
   {
@@ -641,6 +647,23 @@ void SessionWindow::ShowCine()
     this->Monitor->SetRunText(
       QString("RUN %1/%2  FRAME %3/%4").arg(run + 1).arg(runs).arg(frame + 1).arg(frames));
   }
+}
+
+void SessionWindow::ShowEnhancedStent(std::size_t number)
+{
+  XrayAngiogram run;
+  if (!this->Engine->CineRun(number, run))
+  {
+    return;
+  }
+  const EnhancedStent stent = EnhanceStent(run);
+  if (stent.frames > 0)
+  {
+    this->Monitor->SetImage(stent.image);
+  }
+  this->Monitor->SetRunText(stent.frames > 0
+      ? QString("RUN %1  STENT BOOST, %2 FRAMES").arg(number + 1).arg(stent.frames)
+      : QString("RUN %1: NO TWO MARKERS IN ENOUGH FRAMES").arg(number + 1));
 }
 
 void SessionWindow::SaveCine()

@@ -152,6 +152,22 @@ TEST_F(CineFiles, GdcmReadsWhatWasWritten)
   }
 }
 
+TEST_F(CineFiles, ShuttersAreWrittenWhereThereAreAny)
+{
+  XrayAngiogram run = SmallRun();
+  EXPECT_EQ(Value(this->Write(run), 0x0018, 0x1700), "");
+  run.shutterLeft = 1;
+  run.shutterRight = 2;
+  run.shutterBottom = 1;
+  const std::string path = this->Write(run);
+  EXPECT_EQ(Value(path, 0x0018, 0x1700), "RECTANGULAR");
+  // The last column, or row, that is covered; all are counted from 1.
+  EXPECT_EQ(Value(path, 0x0018, 0x1702), "1");
+  EXPECT_EQ(Value(path, 0x0018, 0x1704), "6");
+  EXPECT_EQ(Value(path, 0x0018, 0x1706), "0");
+  EXPECT_EQ(Value(path, 0x0018, 0x1708), "5");
+}
+
 TEST_F(CineFiles, IdentifiersAreThoseOfTheImages)
 {
   XrayAngiogram run = SmallRun();
@@ -304,7 +320,7 @@ TEST(CineRuns, AreHandedOverWholeOrInParts)
   ASSERT_EQ(taken.size(), 1U);
   EXPECT_EQ(NameOfCineFile(taken[0]), "cine_01.dcm");
   EXPECT_EQ(runs.Bytes(), 0U);
-  // Goes on in another part, and so it does in another field.
+  // Goes on in another part, and so it does in another field, or between other shutters.
   runs.Add(Moment(2, 1), Grey(2), Plain);
   coronary::SessionSnapshot wider = Moment(3, 1);
   wider.fieldOfView = 250.0;

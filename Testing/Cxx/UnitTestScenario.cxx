@@ -453,11 +453,14 @@ TEST(UnitTestScenario, ScriptsAreEvenPieces)
   EXPECT_EQ(script.At(5.0).drive.wirePosition, 15.0);
   EXPECT_EQ(script.At(5.0).drive.catheterPosition, 0.5);
   EXPECT_EQ(script.At(100.0).drive.wirePosition, 10.0);
-  EXPECT_TRUE(script.HeartRates(0.0, 4.0).empty());
-  EXPECT_EQ(script.HeartRates(4.0, 4.0005), std::vector<double>{ 90.0 });
-  EXPECT_TRUE(script.HeartRates(4.0005, 9.0).empty());
-  EXPECT_EQ(script.WireExchanges(0.0, 9.0), std::vector<double>{ 1.0 });
-  EXPECT_TRUE(script.Exchanges(0.0, 9.0).empty());
+  EXPECT_TRUE(script.Events(0.0, 4.0).empty());
+  const std::vector<coronary::RecordedEvent> events = script.Events(4.0, 4.0005);
+  ASSERT_EQ(events.size(), 2U);
+  EXPECT_EQ(events[0].kind, coronary::RecordedEvent::HeartRate);
+  EXPECT_EQ(events[0].value, 90.0);
+  EXPECT_EQ(events[1].kind, coronary::RecordedEvent::ExchangeWire);
+  EXPECT_EQ(events[1].value, 1.0);
+  EXPECT_TRUE(script.Events(4.0005, 9.0).empty());
   EXPECT_EQ(coronary::DriveScript().At(1.0).drive.wirePosition, 0.0);
   const auto refused = [](const std::string& pieces, const std::string& part)
   {

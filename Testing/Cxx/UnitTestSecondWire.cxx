@@ -393,8 +393,10 @@ TEST(SecondWire, ScriptsTakeItAndOldRecordingsHaveNoAnswerOfBranches)
   const std::string head = R"({ "format": "dynamiccoronary script", "version": 1, "pieces": )";
   const DriveScript script =
     DriveScriptFromText(head + R"([ { "seconds": 1 }, { "seconds": 2, "take_wire": 1 } ] })", "d");
-  EXPECT_TRUE(script.WiresTaken(0.0, 1.0).empty());
-  EXPECT_EQ(script.WiresTaken(1.0, 3.0), std::vector<double>{ 1.0 });
+  EXPECT_TRUE(script.Events(0.0, 1.0).empty());
+  ASSERT_EQ(script.Events(1.0, 3.0).size(), 1U);
+  EXPECT_EQ(script.Events(1.0, 3.0)[0].kind, RecordedEvent::TakeWire);
+  EXPECT_EQ(script.Events(1.0, 3.0)[0].value, 1.0);
   ExpectRefusal([&]
     { DriveScriptFromText(head + R"([ { "seconds": 1, "take_wire": 2 } ] })", "d"); },
     "'take_wire'");

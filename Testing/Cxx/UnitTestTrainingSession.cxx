@@ -240,6 +240,29 @@ TEST(TrainingSession, TheCArmStaysWithinItsReach)
   EXPECT_EQ(session.FieldOfView(), 150.0);
 }
 
+TEST(TrainingSession, ShuttersTakeAwayDoseAndImage)
+{
+  const Scenario scenario = Aimed();
+  TrainingSession open(Phantom(), scenario);
+  TrainingSession shut(Phantom(), scenario);
+  EXPECT_TRUE(shut.Apply({ RecordedEvent::ShutterSides, 0.25 }));
+  EXPECT_TRUE(shut.Apply({ RecordedEvent::ShutterEnds, 7.0 })); // as far as they go
+  SessionInput input = open.StartInput();
+  input.pedals = FluoroscopyPedal;
+  for (int tick = 0; tick < 1000; ++tick)
+  {
+    open.Step(input);
+    shut.Step(input);
+  }
+  EXPECT_GT(open.Metrics().doseAreaProduct, 0.0);
+  EXPECT_NEAR(shut.Metrics().doseAreaProduct, 0.5 * 0.1 * open.Metrics().doseAreaProduct, 1e-9);
+  EXPECT_EQ(shut.Metrics().airKerma, open.Metrics().airKerma);
+  SessionSnapshot moment;
+  shut.SnapshotOfImage(moment);
+  EXPECT_EQ(moment.shutters.right, 0.25);
+  EXPECT_EQ(moment.shutters.top, 0.45);
+}
+
 TEST(TrainingSession, DosesAsThePatientsThicknessNeeds)
 {
   const Scenario scenario = Aimed();

@@ -45,7 +45,7 @@ void ReadScript(const std::string& bytes)
   {
     Require(std::isfinite(script.At(seconds).drive.wirePosition), "a place that is nowhere");
   }
-  script.HeartRates(0.0, script.Duration());
+  script.Events(0.0, script.Duration());
 }
 
 std::vector<std::string> ScriptSeeds()
