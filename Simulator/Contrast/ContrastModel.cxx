@@ -159,8 +159,9 @@ void ContrastModel::Step(double dt, double phase, double heartRate, double injec
   const double spilled = this->Tracers_.Spilled() - before;
   const bool inAorta = tip.branch == -1;
   this->StepAorta(dt,
-    this->Stroke * EjectedFlow(this->Settings_.aorta, this->Settings_.flow.ejectionBegin,
-      this->Settings_.flow.systoleEnd, phase, heartRate),
+    this->Stroke *
+      EjectedFlow(this->Settings_.aorta, this->Settings_.flow.ejectionBegin,
+        this->Settings_.flow.systoleEnd, phase, heartRate),
     inAorta ? 0.0 : spilled, dt * beside + (inAorta ? spilled : 0.0), tip);
   this->UpdateBlush();
   if (this->Settings_.flowDepression > 0.0)

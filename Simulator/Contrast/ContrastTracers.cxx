@@ -212,8 +212,8 @@ void ContrastTracers::OpenHole(const FlowNetwork& network, int node)
     }
     const double lumen = this->Part_[i] * whole;
     segment += lumen > volume ? 1 : 0;
-    this->Part_[i] = static_cast<float>(
-      lumen > volume ? (lumen - volume) / (whole - volume) : lumen / volume);
+    this->Part_[i] =
+      static_cast<float>(lumen > volume ? (lumen - volume) / (whole - volume) : lumen / volume);
   }
   for (std::vector<double>* ofNodes : { &this->Blush_, &this->Outflow_, &this->Leaked_ })
   {

@@ -84,9 +84,9 @@ public:
   double Y(std::int64_t i) const { return this->Y_[i]; }
   double Volume(std::int64_t i) const { return this->Volume_[i]; } ///< mL of contrast medium
 
-  double Injected() const { return this->Injected_; }               ///< mL so far
-  double Spilled() const { return this->Spilled_; }                 ///< mL so far
-  double WashedOut() const { return this->WashedOut_; }             ///< mL so far
+  double Injected() const { return this->Injected_; }   ///< mL so far
+  double Spilled() const { return this->Spilled_; }     ///< mL so far
+  double WashedOut() const { return this->WashedOut_; } ///< mL so far
   /// mL so far, per node: through its hole.
   const std::vector<double>& Leaked() const { return this->Leaked_; }
   double Absorbed() const { return this->Absorbed_; }               ///< mL so far

@@ -743,8 +743,7 @@ int CoronaryFlow::OpenHole(const CatheterTip& place)
   const int number = this->Network_.Nodes()[node].above;
   const FlowSegment& upper = this->Network_.Segments()[number];
   const FlowSegment& lower = this->Network_.Segments()[number + 1];
-  const auto twice = [number](auto& list)
-  { list.insert(list.begin() + number + 1, list[number]); };
+  const auto twice = [number](auto& list) { list.insert(list.begin() + number + 1, list[number]); };
   twice(this->Flow_);
   twice(this->AtTop);
   twice(this->Losses);
@@ -773,9 +772,8 @@ int CoronaryFlow::OpenHole(const CatheterTip& place)
       }
     }
   }
-  for (std::vector<double>* ofNodes :
-    { &this->Weight, &this->OutletResistance_, &this->HealthyFlow, &this->Compliance,
-      &this->Compartment })
+  for (std::vector<double>* ofNodes : { &this->Weight, &this->OutletResistance_, &this->HealthyFlow,
+         &this->Compliance, &this->Compartment })
   {
     ofNodes->push_back(0.0);
   }
@@ -789,8 +787,8 @@ int CoronaryFlow::OpenHole(const CatheterTip& place)
 
 void CoronaryFlow::SetHole(int node, double conductance, double outside)
 {
-  RequireFlow(conductance >= 0.0 && conductance < 1e6, "conductance of a hole", conductance,
-    "at least 0");
+  RequireFlow(
+    conductance >= 0.0 && conductance < 1e6, "conductance of a hole", conductance, "at least 0");
   RequireFlow(std::isfinite(outside), "pressure outside of a hole", outside, "finite");
   const auto hole = std::find_if(
     this->Holes.begin(), this->Holes.end(), [node](const Hole& one) { return one.node == node; });

@@ -318,8 +318,7 @@ int FlowNetwork::Split(const CatheterTip& place)
   FlowSegment upper = this->Segments_[number];
   FlowSegment lower = upper;
   const double margin = std::min(SnapLength, 0.25 * (upper.to - upper.from));
-  lower.from = upper.to =
-    std::clamp(here.abscissa, upper.from + margin, upper.to - margin);
+  lower.from = upper.to = std::clamp(here.abscissa, upper.from + margin, upper.to - margin);
   lower.volumeFrom = this->VolumeAt(upper.branch, lower.from);
   lower.volume = upper.volumeFrom + upper.volume - lower.volumeFrom;
   upper.volume = lower.volumeFrom - upper.volumeFrom;

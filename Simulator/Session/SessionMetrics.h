@@ -38,8 +38,8 @@ struct SessionMetrics
   double strokeShare = 1.0;         ///< of the stroke volume that is left
   std::int64_t openHoles = 0;       ///< that are not sealed
   ///@}
-  double wireTurning = 0.0;      ///< radians, left and right together
-  double deepest = 0.0;          ///< mm of wire beyond the catheter's tip
+  double wireTurning = 0.0;  ///< radians, left and right together
+  double deepest = 0.0;      ///< mm of wire beyond the catheter's tip
   std::vector<int> branches; ///< in which the tip has been, in the order in which they were reached
   std::vector<ProcedureEvent> events;
 };

@@ -10,11 +10,11 @@ namespace coronary
 {
 namespace
 {
-constexpr double FaintestTear = 1e-5;    // mL
-constexpr double StripeRadius = 0.4; // mm
-constexpr double Dilution = 3.0;     // mL of a cloud for each of its medium
-constexpr double LeastSigma = 0.8;   // mm
-constexpr double SpreadSigma = 14.0; // mm
+constexpr double FaintestTear = 1e-5; // mL
+constexpr double StripeRadius = 0.5;  // mm
+constexpr double Dilution = 6.0;      // mL of a cloud for each of its medium
+constexpr double LeastSigma = 0.8;    // mm
+constexpr double SpreadSigma = 14.0;  // mm
 
 /// A part of what is beside a hole. In sigmas of a ball of it all: outwards, along, its own.
 struct Puff
@@ -24,12 +24,12 @@ struct Puff
   double sigma;
   double share;
 };
-constexpr std::array<Puff, 4> Puffs{ { { 0.8, 0.0, 0.6, 0.4 }, { 1.6, 1.1, 0.8, 0.25 },
-  { 1.9, -0.9, 0.7, 0.2 }, { 2.9, 0.3, 0.9, 0.15 } } };
+constexpr std::array<Puff, 5> Puffs{ { { 0.8, 0.0, 0.65, 0.25 }, { 1.6, 1.1, 0.8, 0.2 },
+  { 1.8, -1.4, 0.7, 0.2 }, { 2.7, 0.1, 0.9, 0.2 }, { 1.3, 2.6, 0.9, 0.15 } } };
 
 /// Unit, away from the middle and across the vessel.
-Vector3 OutwardsAt(const std::vector<Vector3>& axis, std::int64_t point, const Vector3& middle,
-  const Vector3& along)
+Vector3 OutwardsAt(
+  const std::vector<Vector3>& axis, std::int64_t point, const Vector3& middle, const Vector3& along)
 {
   Vector3 out = axis[point] - middle;
   out -= out.dot(along) * along;
@@ -76,8 +76,8 @@ void AddTears(const std::vector<VesselTear>& tears, const std::vector<Vector3>& 
       double volume = 0.0;
       for (std::int64_t k = tear.first; k <= tear.last; ++k)
       {
-        stripe.points.push_back(axis[k] +
-          (lumen[k] + StripeRadius) * OutwardsAt(axis, k, middle, along));
+        stripe.points.push_back(
+          axis[k] + (lumen[k] + StripeRadius) * OutwardsAt(axis, k, middle, along));
         stripe.radii.push_back(StripeRadius);
         volume += k > tear.first ? 1e-3 * Pi * StripeRadius * StripeRadius *
             (stripe.points.back() - stripe.points[stripe.points.size() - 2]).norm()

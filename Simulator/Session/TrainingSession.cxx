@@ -678,10 +678,10 @@ void TrainingSession::Internals::MeasureHands(const SessionInput& input)
 void TrainingSession::Internals::StepProcedure()
 {
   const bool lesions = this->Procedure->NeedsLesions();
-  this->Procedure->Step({ this->Report.tick, this->Metrics, this->Pose,
-                          this->Clock.Radiating() && this->Clock.Last().cine, this->Clock.Runs(),
-                          this->Medium.Tracers().Injected(), this->WireNumbers[this->InHand],
-                          &this->Tears.All() },
+  this->Procedure->Step(
+    { this->Report.tick, this->Metrics, this->Pose,
+      this->Clock.Radiating() && this->Clock.Last().cine, this->Clock.Runs(),
+      this->Medium.Tracers().Injected(), this->WireNumbers[this->InHand], &this->Tears.All() },
     lesions ? this->Watch.Results(this->Physics, this->Medium) : std::vector<LesionResult>(),
     lesions ? this->Watch.Stents(this->Physics) : std::vector<StentResult>(), this->Messages,
     lesions ? this->Watch.Mouths(this->Physics, this->Medium) : std::vector<MouthResult>());

@@ -15,7 +15,7 @@ namespace coronary
 namespace
 {
 constexpr double PascalPerMmHg = 133.322387415;
-constexpr double LeastOpen = 0.5;      // atm: a balloon with less is not open
+constexpr double LeastOpen = 0.5;    // atm: a balloon with less is not open
 constexpr double OneTear = 5.0;      // mm of a vessel in which a balloon makes one
 constexpr double OneHole = 3.0;      // mm, likewise of a wire's tip
 constexpr double FlapEnd = 3.0;      // mm over which a flap ends
@@ -27,19 +27,19 @@ constexpr double LeastHole = 0.5;    // mm, of a wall that just bursts
 constexpr double HoleGrowth = 20.0;  // mm for each part of stretch beyond
 constexpr double GreatestHole = 2.5; // mm
 constexpr double LeastLeak = 0.1;    // mL that are seen
-constexpr double SpreadTime = 20.0;  // s in which medium goes from beside the vessel into the sac
-constexpr double Pocket = 0.3;       // mm of half the wall's circle that a dissection fills
+constexpr double SpreadTime = 60.0;  // s in which medium goes from beside the vessel into the sac
+constexpr double Pocket = 0.6;       // mm of half the wall's circle that a dissection fills
 constexpr double StainTime = 1.5;    // s in which neat medium fills it
 constexpr double SacPressure = 9.0 / 14.0; // mmHg, p1
-constexpr double SacVolume = 57.65;  // mL, V1
-constexpr double HalfStroke = 8.0;   // mmHg, at which half of the stroke volume is left
-constexpr double Noticed = 1.0;      // mmHg after which the heart's supply is looked at again
+constexpr double SacVolume = 57.65;        // mL, V1
+constexpr double HalfStroke = 8.0;         // mmHg, at which half of the stroke volume is left
+constexpr double Noticed = 1.0;            // mmHg after which the heart's supply is looked at again
 
 std::string Where(const VesselTear& tear)
 {
   char text[120];
-  std::snprintf(text, sizeof(text), "It is in %s, %.1f mm from the ostium.", tear.vessel.c_str(),
-    tear.place);
+  std::snprintf(
+    text, sizeof(text), "It is in %s, %.1f mm from the ostium.", tear.vessel.c_str(), tear.place);
   return text;
 }
 
@@ -85,11 +85,12 @@ double HoleOf(double stretch, const WallStrength& strength)
 
 double HoleConductance(double diameter)
 {
-  constexpr double density = 1060.0;  // kg/m^3
-  constexpr double reference = 80.0;  // mmHg
-  constexpr double contraction = 0.6; // of the jet behind a sharp edge
-  const double area = 0.25 * Pi * diameter * diameter;                    // mm^2
-  const double speed = std::sqrt(2.0 * reference * PascalPerMmHg / density); // m/s: mL/s through a mm^2
+  constexpr double density = 1060.0;                   // kg/m^3
+  constexpr double reference = 80.0;                   // mmHg
+  constexpr double contraction = 0.6;                  // of the jet behind a sharp edge
+  const double area = 0.25 * Pi * diameter * diameter; // mm^2
+  const double speed =
+    std::sqrt(2.0 * reference * PascalPerMmHg / density); // m/s: mL/s through a mm^2
   return contraction * area * speed / reference;
 }
 
@@ -224,8 +225,8 @@ void VesselTears::Stretch(const Intervention& instruments, ContrastModel& medium
   for (const auto& [point, radius] : instruments.Balloon()->Sections())
   {
     const WallStation& station = wall->Stations()[point];
-    const double stretch = FreeStretch(
-      wall->Radii()[point] / station.reference, station.calcium, this->Strength);
+    const double stretch =
+      FreeStretch(wall->Radii()[point] / station.reference, station.calcium, this->Strength);
     if (stretch > this->Strength.dissection &&
       FlapOf(stretch, this->Strength) > (this->Flaps.empty() ? 0.0 : this->Flaps[point]))
     {
@@ -260,8 +261,7 @@ void VesselTears::Stretch(const Intervention& instruments, ContrastModel& medium
 }
 
 /// The tip has pressed long enough: the hole is at the point of its vessel's axis next to it.
-void VesselTears::Puncture(
-  const Intervention& instruments, WallMotion& wall, ContrastModel& medium)
+void VesselTears::Puncture(const Intervention& instruments, WallMotion& wall, ContrastModel& medium)
 {
   const TickReport& report = instruments.Report();
   const std::vector<Vector3>& line = instruments.Centerline(report.hand);
@@ -440,7 +440,8 @@ void VesselTears::Step(double step, double now, const Intervention& instruments,
 
 std::int64_t VesselTears::OpenHoles() const
 {
-  return std::count_if(this->Tears.begin(), this->Tears.end(), [](const VesselTear& tear)
+  return std::count_if(this->Tears.begin(), this->Tears.end(),
+    [](const VesselTear& tear)
     { return tear.kind == VesselTear::Kind::Perforation && !tear.sealed; });
 }
 

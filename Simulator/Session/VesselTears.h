@@ -20,10 +20,12 @@ class WallMotion;
 /// What a wall bears. docs/simulator.md has the sources, and what was chosen.
 struct WallStrength
 {
-  double dissection = 1.3;   ///< diameter over reference, of wall that is free of calcium, from where it is dissected
-  double rupture = 1.35;     ///< likewise, from where it is perforated
-  double stiffest = 0.5;     ///< of its circle that calcium keeps from stretching, at most: more of it cracks
-  double puncture = 2.0;     ///< MPa under a wire's tip
+  double dissection =
+    1.3; ///< diameter over reference, of wall that is free of calcium, from where it is dissected
+  double rupture = 1.35; ///< likewise, from where it is perforated
+  double stiffest =
+    0.5; ///< of its circle that calcium keeps from stretching, at most: more of it cracks
+  double puncture = 2.0;      ///< MPa under a wire's tip
   double punctureTime = 0.05; ///< s for which it has to last
 };
 
@@ -142,8 +144,8 @@ private:
     LesionWatch& watch, std::vector<std::string>& said);
   void Stain(VesselTear& tear, double step, const Intervention& instruments, ContrastModel& medium,
     LesionWatch& watch, std::vector<std::string>& said);
-  void SetHeart(double now, ContrastModel& medium, LesionWatch& watch,
-    std::vector<std::string>& said);
+  void SetHeart(
+    double now, ContrastModel& medium, LesionWatch& watch, std::vector<std::string>& said);
   VesselTear At(std::int64_t point, VesselTear::Kind kind) const;
   VesselTear* Near(std::int64_t point, VesselTear::Kind kind, double reach);
   int BranchOf(std::int64_t point) const;
