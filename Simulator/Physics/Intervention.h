@@ -47,8 +47,9 @@ struct InterventionSettings
   double maximumSpeed = 300.0; ///< mm/s by which hands can advance; more is clamped, with a message
   double maximumTurning = 30.0; ///< rad/s, likewise
   bool wallTears = true;        ///< sessions: walls are dissected and perforated
-  double sealTime = 300.0;      ///< s, likewise, that a balloon has to be across a hole, 1 to 3600
-  bool branchesAnswer = true;   ///< what opens a vessel narrows the mouths of its side branches
+  double sealTime =
+    300.0; ///< s that a balloon has to be across a hole in the wall until it has closed
+  bool branchesAnswer = true; ///< what opens a vessel narrows the mouths of its side branches
 
   /// @throws std::invalid_argument naming the setting
   void Validate() const;
