@@ -29,7 +29,7 @@ void MetricsPanel::ShowMetrics(
   }
   const QString step = QString::fromStdString(next);
   const QString blood = metrics.pericardialBlood > 0.0
-    ? QString("Pericardium  %1 mL of blood, %2 mmHg    Stroke volume  %3 %\n")
+    ? QString("Pericardium  %1 mL, %2 mmHg    Stroke volume  %3 %\n")
         .arg(metrics.pericardialBlood, 0, 'f', 0)
         .arg(metrics.pericardialPressure, 0, 'f', 1)
         .arg(100.0 * metrics.strokeShare, 0, 'f', 0)
