@@ -111,7 +111,8 @@ std::string Numbers(const Json& session)
     { "of it in the vessel without X-ray, mm", "wire_travel_without_xray_mm" },
     { "wire beyond the catheter at most, mm", "deepest_mm" },
     { "vessel closed by a balloon, s", "occluded_s" },
-    { "ST segment up by 0.1 mV, s", "st_elevated_s" } };
+    { "ST segment up by 0.1 mV, s", "st_elevated_s" },
+    { "blood in the pericardium, mL", "pericardial_mL" } };
   const Json& metrics = session.at("metrics");
   std::string page = "<h2>Numbers</h2>\n<table>\n";
   for (const auto& [name, member] : rows)
@@ -154,6 +155,18 @@ std::string Results(const Json& session)
   };
   narrowed("lesions", "Lesions");
   narrowed("side_branches", "Side branches");
+  if (session.contains("tears"))
+  {
+    page += "<h2>Torn walls</h2>\n" +
+      Table(session["tears"],
+        { { "what", "what" }, { "vessel", "vessel" }, { "by", "by" }, { "sealed", "sealed" },
+          { "from the ostium, mm", "place_mm" },
+          { "diameter over reference", "diameter_over_reference" },
+          { "flap, % of the diameter", "flap_percent" }, { "hole, mm", "hole_mm" },
+          { "Ellis type", "ellis" }, { "blood, mL", "blood_mL" },
+          { "contrast medium, mL", "contrast_mL" } },
+        4);
+  }
   if (session.contains("stents") && !session["stents"].empty())
   {
     page += "<h2>Stents</h2>\n" +

@@ -87,7 +87,10 @@ Json MetricsToJson(const SessionMetrics& metrics, const WallTopology& topology)
     { "wire_travel_without_xray_mm", metrics.blindTravel },
     { "idle_xray_s", metrics.idleBeamSeconds }, { "occluded_s", metrics.occludedSeconds },
     { "greatest_st_shift_mV", metrics.greatestStShift },
-    { "st_elevated_s", metrics.elevatedSeconds }, { "path", branches }, { "events", events } };
+    { "st_elevated_s", metrics.elevatedSeconds }, { "pericardial_mL", metrics.pericardialBlood },
+    { "pericardial_mmHg", metrics.pericardialPressure },
+    { "stroke_volume_percent", 100.0 * metrics.strokeShare }, { "path", branches },
+    { "events", events } };
 }
 
 Json LesionsToJson(const std::vector<LesionResult>& lesions)
@@ -139,6 +142,36 @@ Json StentsToJson(const std::vector<StentResult>& stents)
       json["disease_before_mm"] = one.missedBefore;
       json["disease_behind_mm"] = one.missedBehind;
       json["covers_no_lesion"] = one.missedAll;
+    }
+    list.push_back(json);
+  }
+  return list;
+}
+
+Json TearsToJson(const std::vector<VesselTear>& tears)
+{
+  Json list = Json::array();
+  for (const VesselTear& one : tears)
+  {
+    const bool hole = one.kind == VesselTear::Kind::Perforation;
+    Json json = { { "what", hole ? "perforation" : "dissection" }, { "vessel", one.vessel },
+      { "place_mm", one.place }, { "by", one.stretch > 0.0 ? "balloon" : "wire" },
+      { "sealed", one.sealed ? "yes" : "no" } };
+    if (one.stretch > 0.0)
+    {
+      json["diameter_over_reference"] = one.stretch;
+    }
+    if (hole)
+    {
+      json["ellis"] = one.Ellis();
+      json["hole_mm"] = one.diameter;
+      json["blood_mL"] = one.blood;
+      json["contrast_mL"] = one.beside + one.spread;
+    }
+    else
+    {
+      json["flap_percent"] = 100.0 * one.flap;
+      json["contrast_mL"] = one.inWall;
     }
     list.push_back(json);
   }
@@ -209,7 +242,8 @@ public:
       "outside,branch\n";
     this->Flows = "tick,seconds,injection_mL_s,injected_mL,in_tree_mL,blush_mL,washed_out_mL,"
                   "spilled_mL,aortic_pressure_mmHg,air_kerma_mGy,dose_area_Gy_cm2,in_guide_mL,"
-                  "in_aorta_mL,left_aorta_mL\n";
+                  "in_aorta_mL,left_aorta_mL,leaked_mL,in_wall_mL,pericardial_mL,"
+                  "pericardial_mmHg\n";
     this->Balloons =
       "tick,seconds,tip_mm,pressure_atm,least_mm,greatest_mm,hand_force_N,grip_N,wall_atm,"
       "lesion_least_mm,lesion_percent,pd_pa,flow_mL_s\n";
@@ -244,11 +278,13 @@ public:
     this->Forces += text;
     const ContrastBalance medium = session.Balance();
     std::snprintf(text, sizeof(text),
-      "%llu,%.9g,%.6g,%.9g,%.9g,%.9g,%.9g,%.9g,%.6g,%.6g,%.6g,%.9g,%.9g,%.9g\n",
+      "%llu,%.9g,%.6g,%.9g,%.9g,%.9g,%.9g,%.9g,%.6g,%.6g,%.6g,%.9g,%.9g,%.9g,%.9g,%.9g,%.6g,%.6g\n",
       static_cast<unsigned long long>(this->Tick), seconds, session.Report().injection,
       medium.injected, medium.inTree, medium.blush, medium.washedOut, medium.spilled,
       session.Contrast().AorticPressure(), session.Metrics().airKerma,
-      session.Metrics().doseAreaProduct, medium.inGuide, medium.inAorta, medium.leftAorta);
+      session.Metrics().doseAreaProduct, medium.inGuide, medium.inAorta, medium.leftAorta,
+      medium.leaked, medium.inWall, session.Metrics().pericardialBlood,
+      session.Metrics().pericardialPressure);
     this->Flows += text;
     this->Seconds.push_back(seconds);
     const double values[] = { report.tipForce, report.proximalForce, report.balloon.pressure,
@@ -598,6 +634,25 @@ public:
           one.reserve, one.reserveBefore);
       }
     }
+    for (const VesselTear& one : this->Runner.Session().Tears())
+    {
+      const char* sealed = one.sealed ? "sealed" : "open";
+      if (one.kind == VesselTear::Kind::Perforation)
+      {
+        std::printf("perforation in %s: hole of %.2f mm (Ellis %d), %.1f mL of blood, %s\n",
+          one.vessel.c_str(), one.diameter, one.Ellis(), one.blood, sealed);
+      }
+      else
+      {
+        std::printf("dissection in %s: %.0f %% of the diameter, %s\n", one.vessel.c_str(),
+          100.0 * one.flap, sealed);
+      }
+    }
+    if (metrics.pericardialBlood > 0.0)
+    {
+      std::printf("pericardium: %.0f mL, %.1f mmHg; stroke volume %.0f %%\n",
+        metrics.pericardialBlood, metrics.pericardialPressure, 100.0 * metrics.strokeShare);
+    }
     for (const StentResult& one : this->Runner.Session().Stents())
     {
       if (const StentRingResult* narrowest = one.Narrowest())
@@ -685,6 +740,10 @@ private:
         !lesions.empty())
     {
       result["lesions"] = LesionsToJson(lesions);
+    }
+    if (const std::vector<VesselTear>& tears = this->Runner.Session().Tears(); !tears.empty())
+    {
+      result["tears"] = TearsToJson(tears);
     }
     if (!scenario.procedure.empty())
     {

@@ -8,6 +8,7 @@
 #include "vtkCellArray.h"
 #include "vtkDoubleArray.h"
 #include "vtkFloatArray.h"
+#include "vtkGlyph3DMapper.h"
 #include "vtkLight.h"
 #include "vtkPointData.h"
 #include "vtkPoints.h"
@@ -16,6 +17,7 @@
 #include "vtkPolyDataNormals.h"
 #include "vtkProperty.h"
 #include "vtkRenderer.h"
+#include "vtkSphereSource.h"
 #include "vtkTubeFilter.h"
 
 #include <algorithm>
@@ -30,6 +32,7 @@ constexpr double RestPhase = 0.75;
 constexpr double WireThickness = 1.4; // of the true radius: to be seen
 constexpr double StrutRadius = 0.06;  // mm, likewise
 constexpr double RingSpacing = 1.5;   // mm along a stent
+constexpr double TearRadius = 2.0;    // mm, of a mark
 constexpr int Crowns = 8;             // of a ring
 constexpr int Links = 2;              // between two rings
 
@@ -117,6 +120,7 @@ vtkSimulatorScene::vtkSimulatorScene(WallMotion& wall, const Scenario& scenario,
   this->Vessels.aorta = wall.Topology().aorta;
   this->MakeInstruments(scenario);
   this->MakeTracers();
+  this->MakeTears();
   this->MakeWall(wall, settings.triangles);
   this->LookFromFront();
 }
@@ -312,6 +316,35 @@ void vtkSimulatorScene::MakeTracers()
   look->LightingOff();
 }
 
+void vtkSimulatorScene::MakeTears()
+{
+  UsePoints(this->TearPoints);
+  vtkNew<vtkSphereSource> ball;
+  ball->SetRadius(TearRadius);
+  vtkNew<vtkGlyph3DMapper> mapper;
+  mapper->SetInputData(this->TearPoints);
+  mapper->SetSourceConnection(ball->GetOutputPort());
+  mapper->ScalarVisibilityOff();
+  this->TearActor->SetMapper(mapper);
+  this->TearActor->GetProperty()->SetColor(1.0, 0.15, 0.85);
+  this->TearActor->GetProperty()->SetAmbient(0.7);
+  this->Renderer_->AddActor(this->TearActor);
+}
+
+/// Marks where walls are torn and not sealed.
+void vtkSimulatorScene::SetTears(const SessionSnapshot& snapshot)
+{
+  std::vector<Vector3> places;
+  for (const VesselTear& tear : snapshot.tears)
+  {
+    if (!tear.sealed)
+    {
+      places.push_back(snapshot.axis[tear.point]);
+    }
+  }
+  SetPoints(this->TearPoints, places);
+}
+
 /// Rings of zigzags with links between them; a stent of no maker.
 void vtkSimulatorScene::SetStents(const std::vector<StentShape>& stents)
 {
@@ -414,6 +447,10 @@ void vtkSimulatorScene::Update(const SessionSnapshot& snapshot)
   if (!snapshot.stents.empty() || this->StentLines->GetNumberOfPoints() > 0)
   {
     this->SetStents(snapshot.stents);
+  }
+  if (!snapshot.tears.empty())
+  {
+    this->SetTears(snapshot);
   }
   if (this->TracerActor->GetVisibility() != 0)
   {

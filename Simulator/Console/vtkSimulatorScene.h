@@ -76,6 +76,8 @@ private:
   void MakeAorta();
   void MakeInstruments(const Scenario& scenario);
   void MakeTracers();
+  void MakeTears();
+  void SetTears(const SessionSnapshot& snapshot);
   void SetStents(const std::vector<StentShape>& stents);
 
   std::shared_ptr<const HeartShell> Heart;
@@ -111,6 +113,8 @@ private:
   vtkNew<vtkActor> StentActor;
   vtkNew<vtkPolyData> TracerPoints;
   vtkNew<vtkActor> TracerActor;
+  vtkNew<vtkPolyData> TearPoints;
+  vtkNew<vtkActor> TearActor;
 };
 }
 

@@ -159,8 +159,9 @@ void ContrastModel::Step(double dt, double phase, double heartRate, double injec
   const double spilled = this->Tracers_.Spilled() - before;
   const bool inAorta = tip.branch == -1;
   this->StepAorta(dt,
-    EjectedFlow(this->Settings_.aorta, this->Settings_.flow.ejectionBegin,
-      this->Settings_.flow.systoleEnd, phase, heartRate),
+    this->Stroke *
+      EjectedFlow(this->Settings_.aorta, this->Settings_.flow.ejectionBegin,
+        this->Settings_.flow.systoleEnd, phase, heartRate),
     inAorta ? 0.0 : spilled, dt * beside + (inAorta ? spilled : 0.0), tip);
   this->UpdateBlush();
   if (this->Settings_.flowDepression > 0.0)
@@ -187,6 +188,37 @@ void ContrastModel::StepAorta(
   inflow.direct = beside;
   inflow.place = tip.branch == -1 ? tip.abscissa : this->Aorta_.Sections().mouths[this->LastMouth];
   this->Aorta_.Step(dt, flow, inflow);
+}
+
+int ContrastModel::OpenHole(const CatheterTip& place)
+{
+  const int node = this->Flow_.OpenHole(place);
+  this->Tracers_.OpenHole(this->Flow_.Network(), node);
+  return node;
+}
+
+void ContrastModel::SetHeart(double stroke, double pressure)
+{
+  RequireContrast(Within(stroke, 0.0, 1.0), "factor of the stroke volume", stroke, "0 to 1");
+  this->Flow_.SetPressureFactor(pressure);
+  this->Stroke = stroke;
+}
+
+double ContrastModel::Absorb(int branch, double from, double to, double part)
+{
+  const FlowNetwork& network = this->Flow_.Network();
+  double taken = 0.0;
+  for (const int s : network.Branches().at(branch).segments)
+  {
+    const FlowSegment& segment = network.Segments()[s];
+    if (segment.to > from && segment.from < to)
+    {
+      taken += this->Tracers_.Absorb(s, network.VolumeAt(branch, from) - segment.volumeFrom,
+        network.VolumeAt(branch, to) - segment.volumeFrom, part);
+    }
+  }
+  this->Current = this->Current && taken == 0.0;
+  return taken;
 }
 
 void ContrastModel::UpdateBlush()
@@ -377,6 +409,11 @@ ContrastBalance ContrastModel::Balance() const
   balance.spilled = this->Tracers_.Spilled() + this->Beside;
   balance.inAorta = this->Aorta_.InAorta();
   balance.leftAorta = this->Aorta_.Left();
+  for (const double leaked : this->Tracers_.Leaked())
+  {
+    balance.leaked += leaked;
+  }
+  balance.inWall = this->Tracers_.Absorbed();
   return balance;
 }
 

@@ -45,7 +45,7 @@ struct ContrastSlab
   double volume = 0.0; ///< mL at rest
 };
 
-/// mL of contrast medium; injected = inGuide + inTree + blush + washedOut + spilled.
+/// mL of contrast medium; injected = inGuide + inTree + blush + washedOut + spilled + leaked + inWall.
 struct ContrastBalance
 {
   double injected = 0.0;
@@ -57,6 +57,8 @@ struct ContrastBalance
     0.0; ///< into the aorta: injected there, refluxed, or flowed back through an ostium
   double inAorta = 0.0;   ///< of that, in root and ascending aorta
   double leftAorta = 0.0; ///< of that, beyond
+  double leaked = 0.0;    ///< out of the vessels through holes in their wall
+  double inWall = 0.0;    ///< in the wall, where it is torn
 };
 
 /**
@@ -133,6 +135,23 @@ public:
     this->Flow_.SetLumen(radius, instrument);
   }
 
+  ///@{
+  /// As CoronaryFlow's; contrast medium leaks with the blood.
+  int OpenHole(const CatheterTip& place);
+  void SetHole(int node, double conductance, double outside)
+  {
+    this->Flow_.SetHole(node, conductance, outside);
+  }
+  double LeakFlow(int node) const { return this->Flow_.LeakFlow(node); } ///< mL/s
+  /// mL of contrast medium, so far.
+  double Leaked(int node) const { return this->Tracers_.Leaked()[static_cast<std::size_t>(node)]; }
+  ///@}
+  /// A heart that ejects less, from the next step on. @param stroke, pressure  times stroke volume and pressures, 0 to 1
+  void SetHeart(double stroke, double pressure);
+  /// The wall takes a part of what is in the lumen beside it. @param from, to  mm along a branch @param part  0 to 1
+  /// @return mL of contrast medium
+  double Absorb(int branch, double from, double to, double part);
+
   const CoronaryFlow& FlowModel() const { return this->Flow_; }
   const ContrastTracers& Tracers() const { return this->Tracers_; }
   /// It follows from the rest's states, and is not in StateHash().
@@ -164,6 +183,7 @@ private:
   ContrastTracers Tracers_;
   AorticContrast Aorta_;
   double Beside = 0.0;       ///< mL, so far
+  double Stroke = 1.0;       ///< times the stroke volume
   std::size_t LastMouth = 0; ///< tree of the last injection
   std::vector<ContrastSlab> Slabs_;
   std::vector<double> SlabLength;      ///< mm

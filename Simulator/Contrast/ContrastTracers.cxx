@@ -165,17 +165,9 @@ ContrastTracers::ContrastTracers(
   , TracerVolume(settings.volume)
 {
   settings.Validate();
-  for (const FlowSegment& segment : network.Segments())
-  {
-    this->Segments.push_back({ segment.above, segment.below, segment.volume, segment.Radius(),
-      segment.to - segment.from });
-  }
+  this->Leaked_.assign(network.Nodes().size(), 0.0);
+  this->MakeSegments(network);
   this->MakeJunctions(network);
-  const std::size_t segments = this->Segments.size();
-  this->Motions.resize(segments);
-  this->AxialSteps.resize(segments);
-  this->FlowTop.assign(segments, 0.0);
-  this->FlowBottom.assign(segments, 0.0);
   const auto capacity = static_cast<std::size_t>(settings.capacity);
   this->Segment_.resize(capacity);
   this->Part_.resize(capacity);
@@ -185,9 +177,84 @@ ContrastTracers::ContrastTracers(
   this->Leaving.resize(capacity + 1);
   this->Order.resize(capacity);
   this->Batch.resize(BatchSize);
-  this->CellBegin.resize(segments * CellsOfSegment + 1);
   this->Blush_.assign(network.Nodes().size(), 0.0);
   this->Outflow_.assign(network.Nodes().size(), 0.0);
+}
+
+void ContrastTracers::MakeSegments(const FlowNetwork& network)
+{
+  this->Segments.clear();
+  for (const FlowSegment& segment : network.Segments())
+  {
+    this->Segments.push_back({ segment.above, segment.below, segment.volume, segment.Radius(),
+      segment.to - segment.from });
+  }
+  const std::size_t segments = this->Segments.size();
+  this->Motions.resize(segments);
+  this->AxialSteps.resize(segments);
+  this->FlowTop.assign(segments, 0.0);
+  this->FlowBottom.assign(segments, 0.0);
+  this->CellBegin.resize(segments * CellsOfSegment + 1);
+}
+
+void ContrastTracers::OpenHole(const FlowNetwork& network, int node)
+{
+  const std::int32_t upper = network.Nodes()[node].above;
+  const double volume = network.Segments()[upper].volume;
+  const double whole = volume + network.Segments()[upper + 1].volume;
+  for (std::int64_t i = 0; i < this->Size_; ++i)
+  {
+    std::int32_t& segment = this->Segment_[i];
+    if (segment != upper)
+    {
+      segment += segment > upper ? 1 : 0;
+      continue;
+    }
+    const double lumen = this->Part_[i] * whole;
+    segment += lumen > volume ? 1 : 0;
+    this->Part_[i] =
+      static_cast<float>(lumen > volume ? (lumen - volume) / (whole - volume) : lumen / volume);
+  }
+  for (std::vector<double>* ofNodes : { &this->Blush_, &this->Outflow_, &this->Leaked_ })
+  {
+    ofNodes->resize(network.Nodes().size(), 0.0);
+  }
+  std::vector<char> holes;
+  for (const Junction& junction : this->Junctions)
+  {
+    holes.push_back(junction.hole ? 1 : 0);
+  }
+  holes.push_back(1);
+  this->MakeSegments(network);
+  this->Junctions.clear();
+  this->MakeJunctions(network);
+  for (std::size_t n = 0; n < holes.size(); ++n)
+  {
+    Junction& junction = this->Junctions[n];
+    if (holes[n] != 0)
+    {
+      junction.hole = true;
+      junction.segments.push_back(-1); // at one side of the wall
+      junction.tubes.reserve(junction.segments.size());
+    }
+  }
+}
+
+double ContrastTracers::Absorb(int segment, double from, double to, double part)
+{
+  double taken = 0.0;
+  for (std::int64_t i = 0; i < this->Size_; ++i)
+  {
+    const double lumen = this->Segment_[i] == segment ? this->Lumen(i) : -1.0;
+    if (lumen >= from && lumen <= to)
+    {
+      const double more = part * this->Volume_[i];
+      this->Volume_[i] -= more;
+      taken += more;
+    }
+  }
+  this->Absorbed_ += taken;
+  return taken;
 }
 
 void ContrastTracers::MakeJunctions(const FlowNetwork& network)
@@ -296,6 +363,12 @@ void ContrastTracers::PrepareJunctions()
     for (const int s : junction.segments)
     {
       rest -= s >= 0 ? outOf(s) : 0.0;
+    }
+    if (junction.hole)
+    {
+      // Round-off of a closed hole lets nothing through.
+      const double passes = std::abs(outOf(junction.segments.front()));
+      rest = rest > 1e-9 * passes ? rest : 0.0;
     }
     double total = 0.0;
     for (const int s : junction.segments)
@@ -514,6 +587,10 @@ bool ContrastTracers::Enter(Crossing& crossing)
     this->Blush_[node] += tracer.volume;
     this->Outflow_[node] += tracer.volume;
   }
+  else if (this->Junctions[node].hole)
+  {
+    this->Leaked_[node] += tracer.volume;
+  }
   else
   {
     this->Spilled_ += tracer.volume;
@@ -707,6 +784,11 @@ std::uint64_t ContrastTracers::StateHash() const
     std::array<double, 4>{ this->Injected_, this->Spilled_, this->WashedOut_, this->TracerVolume },
     4);
   add(std::array<std::uint64_t, 3>{ this->Key, this->Steps, this->Emitted }, 3);
+  if (std::any_of(this->Junctions.begin(), this->Junctions.end(),
+        [](const Junction& junction) { return junction.hole; }))
+  {
+    add(this->Leaked_, this->Leaked_.size());
+  }
   return hash;
 }
 }

@@ -65,6 +65,13 @@ public:
   /// Injects, moves and washes out. An injector of segment -1 with injection above 0: into the aorta.
   void Step(double dt, const TracerFlow& flow);
 
+  /// The network has a hole more: a node of a segment that was split. Tracers stay where they are. Not within a step.
+  /// @param node  as FlowNetwork::Split
+  void OpenHole(const FlowNetwork& network, int node);
+  /// Tissue beside a stretch of a branch takes this part of what is in it. @param from, to  mL of a segment's lumen before it
+  /// @return mL of contrast medium
+  double Absorb(int segment, double from, double to, double part);
+
   const ContrastTracerSettings& Settings() const { return this->Settings_; }
   std::int64_t Size() const { return this->Size_; }
   int Segment(std::int64_t i) const { return this->Segment_[i]; }
@@ -77,9 +84,12 @@ public:
   double Y(std::int64_t i) const { return this->Y_[i]; }
   double Volume(std::int64_t i) const { return this->Volume_[i]; } ///< mL of contrast medium
 
-  double Injected() const { return this->Injected_; }               ///< mL so far
-  double Spilled() const { return this->Spilled_; }                 ///< mL so far
-  double WashedOut() const { return this->WashedOut_; }             ///< mL so far
+  double Injected() const { return this->Injected_; }   ///< mL so far
+  double Spilled() const { return this->Spilled_; }     ///< mL so far
+  double WashedOut() const { return this->WashedOut_; } ///< mL so far
+  /// mL so far, per node: through its hole.
+  const std::vector<double>& Leaked() const { return this->Leaked_; }
+  double Absorbed() const { return this->Absorbed_; }               ///< mL so far
   double InTree() const;                                            ///< mL
   const std::vector<double>& Blush() const { return this->Blush_; } ///< mL per node
   /// mL of contrast medium that came through the node's outlet in the last step.
@@ -127,7 +137,9 @@ private:
     float partingY = 0.0F;
     bool tip = false;
     bool root = false;
+    bool hole = false; ///< beside the segments there is a way out through the wall
   };
+  void MakeSegments(const FlowNetwork& network);
   void MakeJunctions(const FlowNetwork& network);
   void PrepareMotion(double dt, const TracerFlow& flow);
   void PrepareJunctions();
@@ -176,6 +188,8 @@ private:
   double WashedOut_ = 0.0;
   std::vector<double> Blush_;
   std::vector<double> Outflow_;
+  std::vector<double> Leaked_;
+  double Absorbed_ = 0.0;
 };
 }
 

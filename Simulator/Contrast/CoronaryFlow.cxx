@@ -386,7 +386,7 @@ double CoronaryFlow::MeanAorticPressure() const
   {
     mean += AorticPressure(this->Settings_, (k + 1.0) / StepsOfCycle) / StepsOfCycle;
   }
-  return mean;
+  return this->PressureFactor * mean;
 }
 
 /// All outlets' resistances times a factor, until nothing moves any more.
@@ -675,6 +675,7 @@ void CoronaryFlow::SolveSteady(double aortic)
     const double conductance = tip ? 1.0 / this->OutletResistance_[n] : 0.0;
     this->Demands[n] = { conductance, conductance * this->Settings_.venousPressure };
   }
+  this->DemandOfHoles();
   this->SolveTrees(aortic);
 }
 
@@ -708,6 +709,7 @@ void CoronaryFlow::Advance(double dt, double aortic, double ventricular)
         before * supply(n, behind, storage) / sum };
     }
   }
+  this->DemandOfHoles();
   this->SolveTrees(aortic);
   for (std::size_t n = 0; n < nodes.size(); ++n)
   {
@@ -720,6 +722,92 @@ void CoronaryFlow::Advance(double dt, double aortic, double ventricular)
   }
   this->Aortic = aortic;
   this->Ventricular = ventricular;
+}
+
+/// Nothing comes back through a hole.
+void CoronaryFlow::DemandOfHoles()
+{
+  for (const Hole& hole : this->Holes)
+  {
+    if (this->Pressure_[hole.node] > hole.outside)
+    {
+      this->Demands[hole.node] = { hole.conductance, hole.conductance * hole.outside };
+    }
+  }
+}
+
+int CoronaryFlow::OpenHole(const CatheterTip& place)
+{
+  const double pressure = this->PressureAt(place);
+  const int node = this->Network_.Split(place);
+  const int number = this->Network_.Nodes()[node].above;
+  const FlowSegment& upper = this->Network_.Segments()[number];
+  const FlowSegment& lower = this->Network_.Segments()[number + 1];
+  const auto twice = [number](auto& list) { list.insert(list.begin() + number + 1, list[number]); };
+  twice(this->Flow_);
+  twice(this->AtTop);
+  twice(this->Losses);
+  if (this->Injector_.segment == number && this->Injector_.abscissa > upper.to)
+  {
+    this->Flow_[number] -= this->Injection_;
+    ++this->Injector_.segment;
+  }
+  else if (this->Injector_.segment > number)
+  {
+    ++this->Injector_.segment;
+  }
+  for (Stenosis& stenosis : this->Stenoses)
+  {
+    const bool behind = stenosis.segment == number && stenosis.abscissa > upper.to;
+    stenosis.segment += stenosis.segment > number || behind ? 1 : 0;
+  }
+  for (std::vector<int>& path : this->Path)
+  {
+    for (std::size_t k = path.size(); k-- > 0;)
+    {
+      path[k] += path[k] > number ? 1 : 0;
+      if (path[k] == number)
+      {
+        path.insert(path.begin() + static_cast<std::ptrdiff_t>(k) + 1, number + 1);
+      }
+    }
+  }
+  for (std::vector<double>* ofNodes : { &this->Weight, &this->OutletResistance_, &this->HealthyFlow,
+         &this->Compliance, &this->Compartment })
+  {
+    ofNodes->push_back(0.0);
+  }
+  this->Demands.emplace_back();
+  this->Pressure_.push_back(pressure);
+  this->Losses[number] = this->LossBetween(number, upper.from, upper.to);
+  this->Losses[number + 1] = this->LossBetween(number + 1, lower.from, lower.to);
+  this->Holes.push_back({ node });
+  return node;
+}
+
+void CoronaryFlow::SetHole(int node, double conductance, double outside)
+{
+  RequireFlow(
+    conductance >= 0.0 && conductance < 1e6, "conductance of a hole", conductance, "at least 0");
+  RequireFlow(std::isfinite(outside), "pressure outside of a hole", outside, "finite");
+  const auto hole = std::find_if(
+    this->Holes.begin(), this->Holes.end(), [node](const Hole& one) { return one.node == node; });
+  RequireFlow(hole != this->Holes.end(), "node of a hole", node, "one that OpenHole gave");
+  hole->conductance = conductance;
+  hole->outside = outside;
+}
+
+double CoronaryFlow::LeakFlow(int node) const
+{
+  const auto hole = std::find_if(
+    this->Holes.begin(), this->Holes.end(), [node](const Hole& one) { return one.node == node; });
+  return hole != this->Holes.end() ? hole->flow : 0.0;
+}
+
+void CoronaryFlow::SetPressureFactor(double factor)
+{
+  RequireFlow(Within(factor, 0.0, 1.0), "factor of the pressures", factor, "0 to 1");
+  this->PressureFactor = factor;
 }
 
 void CoronaryFlow::SolveTrees(double aortic)
@@ -781,6 +869,12 @@ void CoronaryFlow::SolveTrees(double aortic)
     this->Pressure_[segments[s].below] = above - lost;
     this->Flow_[s] = here ? flow + injection : flow;
   }
+  for (Hole& hole : this->Holes)
+  {
+    const FlowNode& node = this->Network_.Nodes()[hole.node];
+    const double out = this->Flow_[node.above] - this->FlowAtBeginning(node.below.front());
+    hole.flow = hole.conductance > 0.0 ? std::max(0.0, out) : 0.0;
+  }
 }
 
 void CoronaryFlow::SetInjector(double injection, const CatheterTip& tip)
@@ -812,12 +906,12 @@ void CoronaryFlow::Step(
     this->Started = true;
   }
   this->SetInjector(injection, tip);
-  const double ventricular = VentricularPressure(this->Settings_, phase);
+  const double ventricular = this->PressureFactor * VentricularPressure(this->Settings_, phase);
   if (heartRate == 0.0)
   {
     this->Ventricular = ventricular;
   }
-  this->Advance(dt, AorticPressure(this->Settings_, phase), ventricular);
+  this->Advance(dt, this->PressureFactor * AorticPressure(this->Settings_, phase), ventricular);
 }
 
 double CoronaryFlow::FlowAtBeginning(int segment) const
@@ -842,6 +936,13 @@ std::uint64_t CoronaryFlow::StateHash(std::uint64_t before) const
     { &this->Flow_, &this->Pressure_, &this->Compartment, &this->OutletFactor })
   {
     hash = Fnv1a(list->data(), list->size() * sizeof(double), hash);
+  }
+  for (const Hole& hole : this->Holes)
+  {
+    for (const double value : { hole.conductance, hole.outside, this->PressureFactor })
+    {
+      hash = Fnv1a(&value, sizeof(value), hash);
+    }
   }
   return Fnv1a(&this->Ventricular, sizeof(this->Ventricular), hash);
 }

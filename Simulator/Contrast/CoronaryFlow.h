@@ -165,6 +165,21 @@ public:
   /// R of the tip, a lesion of (1 - 1 / HyperaemicFlow) R.
   static constexpr double LeastSupply = 1.0 / (2.0 - 1.0 / HyperaemicFlow);
 
+  ///@{
+  /**
+   * Holes in the wall. Blood leaves through one by conductance times pressure difference, outwards only. It is a node of its own
+   * (FlowNetwork::Split), so numbers of segments behind it change.
+   * @return the node, whose hole is closed  @throws as FlowNetwork::Locate
+   */
+  int OpenHole(const CatheterTip& place);
+  /// From the next step on. @param conductance  mL/s/mmHg, at least 0; 0: closed  @param outside  mmHg
+  void SetHole(int node, double conductance, double outside);
+  double LeakFlow(int node) const; ///< mL/s in the last step, at least 0; 0: no hole is there
+  ///@}
+
+  /// Aortic and ventricular pressures times this from the next step on, 0 to 1: of a heart that ejects less.
+  void SetPressureFactor(double factor);
+
   /// Over the bits of all that the next step depends on. @param before  the digest to go on from
   std::uint64_t StateHash(std::uint64_t before) const;
 
@@ -197,6 +212,14 @@ private:
     double offset = 0.0;
   };
 
+  struct Hole
+  {
+    int node = -1;
+    double conductance = 0.0; ///< mL/s/mmHg
+    double outside = 0.0;     ///< mmHg
+    double flow = 0.0;        ///< mL/s in the last step
+  };
+
   void FindStenoses();
   void TakeLesions();
   void MeasureBranch(std::size_t branch);
@@ -217,6 +240,7 @@ private:
   CoronaryFlow InSteadyFlow(double outletFactor) const;
   void Advance(double dt, double aortic, double ventricular);
   void SolveTrees(double aortic);
+  void DemandOfHoles();
   void SetInjector(double injection, const CatheterTip& tip);
 
   CoronaryFlowSettings Settings_;
@@ -250,6 +274,8 @@ private:
   double Aortic = 0.0;
   double Ventricular = 0.0;
   bool Started = false;
+  std::vector<Hole> Holes;
+  double PressureFactor = 1.0;
 };
 }
 

@@ -309,6 +309,42 @@ FlowNetwork::Place FlowNetwork::Locate(const CatheterTip& tip) const
   return place;
 }
 
+int FlowNetwork::Split(const CatheterTip& place)
+{
+  const Place here = this->Locate(place);
+  const int number = here.segment;
+  const int node = static_cast<int>(this->Nodes_.size());
+  const auto renumber = [number](int& segment) { segment += segment > number ? 1 : 0; };
+  FlowSegment upper = this->Segments_[number];
+  FlowSegment lower = upper;
+  const double margin = std::min(SnapLength, 0.25 * (upper.to - upper.from));
+  lower.from = upper.to = std::clamp(here.abscissa, upper.from + margin, upper.to - margin);
+  lower.volumeFrom = this->VolumeAt(upper.branch, lower.from);
+  lower.volume = upper.volumeFrom + upper.volume - lower.volumeFrom;
+  upper.volume = lower.volumeFrom - upper.volumeFrom;
+  upper.below = lower.above = node;
+  for (FlowNode& one : this->Nodes_)
+  {
+    renumber(one.above);
+    std::for_each(one.below.begin(), one.below.end(), renumber);
+  }
+  for (FlowBranch& branch : this->Branches_)
+  {
+    std::for_each(branch.segments.begin(), branch.segments.end(), renumber);
+  }
+  this->Nodes_[lower.below].above = number + 1;
+  FlowNode between;
+  between.above = number;
+  between.below.push_back(number + 1);
+  between.tree = this->Nodes_[upper.above].tree;
+  this->Nodes_.push_back(between);
+  std::vector<int>& along = this->Branches_[upper.branch].segments;
+  along.insert(std::find(along.begin(), along.end(), number) + 1, number + 1);
+  this->Segments_[number] = upper;
+  this->Segments_.insert(this->Segments_.begin() + number + 1, lower);
+  return node;
+}
+
 double FlowNetwork::RadiusAt(int branch, double abscissa) const
 {
   const std::vector<double>& places = this->Branches_[branch].abscissa;

@@ -95,6 +95,13 @@ public:
   /// @throws std::invalid_argument for a branch that is not there, or an abscissa that is not finite
   Place Locate(const CatheterTip& tip) const;
 
+  /**
+   * A node within a segment: the segment ends there, and a new one, whose number is one greater, goes on. Segments behind it are
+   * renumbered; nodes are not. @param place  not nearer to the segment's ends than SnapLength, or a quarter of it, else it is moved
+   * @return the node, the last one  @throws as Locate
+   */
+  int Split(const CatheterTip& place);
+
   /// Of the axis, mm.
   double RadiusAt(int branch, double abscissa) const;
   /// mL from the branch's beginning.

@@ -480,7 +480,7 @@ void DrivenWire::Measure(TickReport& report) const
   report.branch = this->Report_.branch;
   report.capForce = this->CapForce;
   report.jointGap = this->Rod_.LastStep().maximumGap;
-  report.tipForce = 0.0;
+  report.tipForce = report.tipThrust = 0.0;
   report.maximumForce = 0.0;
   report.contacts = 0;
   report.maximumPenetration = 0.0;
@@ -503,6 +503,11 @@ void DrivenWire::Measure(TickReport& report) const
     if (this->Places_[contact.segment] < 3.0 && !this->Room.plugs.Holds(contact))
     {
       report.tipForce += force;
+      if (contact.segment == 0)
+      {
+        // What is in front of it pushes it back.
+        report.tipThrust += contact.force * std::max(0.0, contact.normal.dot(this->Rod_.Axis(0)));
+      }
     }
   }
   if (report.contacts > 0)

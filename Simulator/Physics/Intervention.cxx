@@ -46,6 +46,7 @@ void InterventionSettings::Validate() const
   RequireWithin(this->drag, 0.0, 10.0, "drag");
   RequireWithin(this->maximumSpeed, 1.0, 2000.0, "maximumSpeed");
   RequireWithin(this->maximumTurning, 1.0, 1000.0, "maximumTurning");
+  RequireWithin(this->sealTime, 1.0, 3600.0, "sealTime");
 }
 
 struct Intervention::Internals

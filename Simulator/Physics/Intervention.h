@@ -46,7 +46,10 @@ struct InterventionSettings
   double drag = 2.5;
   double maximumSpeed = 300.0; ///< mm/s by which hands can advance; more is clamped, with a message
   double maximumTurning = 30.0; ///< rad/s, likewise
-  bool branchesAnswer = true;   ///< what opens a vessel narrows the mouths of its side branches
+  bool wallTears = true;        ///< sessions: walls are dissected and perforated
+  double sealTime =
+    300.0; ///< s that a balloon has to be across a hole in the wall until it has closed
+  bool branchesAnswer = true; ///< what opens a vessel narrows the mouths of its side branches
 
   /// @throws std::invalid_argument naming the setting
   void Validate() const;
@@ -77,6 +80,7 @@ struct TickReport
   double proximalForce = 0.0;  ///< N, against advancing
   double proximalTorque = 0.0; ///< N mm, against turning
   double tipForce = 0.0;     ///< N between the wire's last 3 mm and the wall, but for an occlusion
+  double tipThrust = 0.0;    ///< N along it, of the wire's end on the wall, likewise
   double capForce = 0.0;     ///< N of the wire's tip on the tissue of an occlusion
   double maximumForce = 0.0; ///< N of a sample's contact
   int contacts = 0;          ///< samples that press on the wall

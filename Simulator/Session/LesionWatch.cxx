@@ -1,5 +1,7 @@
 #include "LesionWatch.h"
 
+#include "VesselTears.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdarg>
@@ -42,7 +44,8 @@ const char* NameOf(ProcedureEvent::Kind kind, const char*& quantity)
     { "geographic_miss", "disease_mm" }, { "beyond_vessel", "stent_mm" },
     { "ischaemia", "share_without_blood" }, { "vasospasm", "narrowing" },
     { "air_embolism", "air_mL" }, { "side_branch_closed", "carina_shift" },
-    { "jailed_wire_pulled", "N" } };
+    { "jailed_wire_pulled", "N" }, { "dissection", "flap" }, { "perforation", "hole_mm" },
+    { "tamponade", "mmHg" } };
   const auto& [name, value] = names[static_cast<int>(kind)];
   quantity = value;
   return name;
@@ -143,12 +146,12 @@ int LesionWatch::BranchOf(std::int64_t point) const
 }
 
 void LesionWatch::StepFlow(double seconds, const Intervention& instruments,
-  const VesselIncidents& incidents, ContrastModel& medium)
+  const VesselIncidents& incidents, const VesselTears& tears, ContrastModel& medium)
 {
   this->FlowIsNew_ = false;
   const DilatableWall* wall = instruments.Dilated();
   const auto [guideFirst, guideCount] = instruments.GuideCovers();
-  if (wall || guideCount > 0 || incidents.Any() || !this->Filled_.empty())
+  if (wall || guideCount > 0 || incidents.Any() || tears.Any() || !this->Filled_.empty())
   {
     std::vector<double> lumen = wall ? wall->Radii() : this->Resting;
     for (const BranchMouth& mouth : instruments.Mouths())
@@ -174,6 +177,7 @@ void LesionWatch::StepFlow(double seconds, const Intervention& instruments,
     {
       incidents.Apply(lumen, filled);
     }
+    tears.Apply(lumen, filled);
     if (filled != this->Filled_ || lumen != this->Lumen_)
     {
       this->Filled_ = std::move(filled);
@@ -203,6 +207,12 @@ void LesionWatch::StepFlow(double seconds, const Intervention& instruments,
     one.meanAortic += (first ? 1.0 : share) * (aortic - one.meanAortic);
     one.meanDistal += (first ? 1.0 : share) * (distal - one.meanDistal);
   }
+}
+
+void LesionWatch::Renew()
+{
+  this->ReserveIsOld = true;
+  this->ReserveAsked.clear();
 }
 
 void LesionWatch::Note(

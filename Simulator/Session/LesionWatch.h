@@ -19,6 +19,8 @@
 
 namespace coronary
 {
+class VesselTears;
+
 struct LesionResult
 {
   std::string vessel;
@@ -66,7 +68,10 @@ struct ProcedureEvent
     Spasm,              ///< value: narrowing of the diameter
     Air,                ///< in an artery; value: mL
     SideBranchClosed, ///< what was opened beside it closed it; value: how far the carina is over its mouth
-    JailedWirePulled ///< beyond what stents bear along; value: N
+    JailedWirePulled, ///< beyond what stents bear along; value: N
+    Dissection,       ///< value: part of the diameter that its flap takes
+    Perforation,      ///< value: mm of the hole
+    Tamponade         ///< blood presses on the heart; value: mmHg
   };
   Kind kind = Kind::OverExpansion;
   double seconds = 0.0;
@@ -87,7 +92,9 @@ public:
 
   /// A step of the flow: the lumen as it is now, and what lies in it, goes into the network.
   void StepFlow(double seconds, const Intervention& instruments, const VesselIncidents& incidents,
-    ContrastModel& medium);
+    const VesselTears& tears, ContrastModel& medium);
+  /// What blood gets has changed, though the lumen has not.
+  void Renew();
   /// Whether it is another flow since this was true before: the lumen has come to rest, or has changed for half a second.
   bool FlowIsNew() const { return this->FlowIsNew_; }
   /// @param place  mm from the ostium

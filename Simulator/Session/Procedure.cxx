@@ -52,6 +52,21 @@ std::size_t LesionFor(const ProcedureStep& step, const std::vector<LesionResult>
   return best;
 }
 
+/// There is a hole in a wall, and all of them are so.
+template <typename Property>
+bool HolesAre(const ProcedureMoment& moment, Property are)
+{
+  bool any = false;
+  bool all = true;
+  for (const VesselTear& tear : moment.tears ? *moment.tears : std::vector<VesselTear>())
+  {
+    const bool hole = tear.kind == VesselTear::Kind::Perforation;
+    any = any || hole;
+    all = all && (!hole || are(tear));
+  }
+  return any && all;
+}
+
 double Counted(const SessionMetrics& metrics, ProcedureEvent::Kind kind)
 {
   return static_cast<double>(std::count_if(metrics.events.begin(), metrics.events.end(),
@@ -198,6 +213,10 @@ bool ProcedureWatch::Reached(const ProcedureMoment& moment,
         std::all_of(mouths.begin(), mouths.end(),
           [&](const MouthResult& mouth)
           { return mouth.vessel != step.vessel || (!mouth.closed && mouth.reserve > step.value); });
+    case Goal::LeakStopped:
+      return HolesAre(moment, [](const VesselTear& hole) { return hole.sealed || hole.covered; });
+    case Goal::LeakSealed:
+      return HolesAre(moment, [](const VesselTear& hole) { return hole.sealed; });
   }
   return false;
 }
@@ -247,6 +266,21 @@ ProcedureScore ScoreOf(const std::vector<ProcedureStep>& steps, const ProcedureS
       score.failures.push_back("the side branch " + mouth.vessel + " is left closed");
     }
   }
+  // A procedure that asks for a sealed hole forgives one.
+  const auto asked = static_cast<double>(std::count_if(steps.begin(), steps.end(),
+    [](const ProcedureStep& step) { return step.goal == Goal::LeakSealed; }));
+  if (Counted(metrics, Kind::Perforation) > asked)
+  {
+    score.failures.emplace_back("a vessel was perforated");
+  }
+  if (metrics.openHoles > 0)
+  {
+    score.failures.emplace_back("a perforation is left open");
+  }
+  if (Counted(metrics, Kind::Tamponade) > 0.0)
+  {
+    score.failures.emplace_back("the heart was tamponaded");
+  }
   const auto stentsThat = [&](const auto& are)
   { return static_cast<double>(std::count_if(stents.begin(), stents.end(), are)); };
   score.items = {
@@ -289,6 +323,8 @@ ProcedureScore ScoreOf(const std::vector<ProcedureStep>& steps, const ProcedureS
     { "side branch closed", Counted(metrics, Kind::SideBranchClosed), "times", 20.0, 40.0 },
     { "jailed wire pulled with more than 0.5 N", Counted(metrics, Kind::JailedWirePulled), "times",
       10.0, 10.0 },
+    { "wall dissected", Counted(metrics, Kind::Dissection), "times", 10.0, 20.0 },
+    { "blood in the pericardium", metrics.pericardialBlood, "mL", 0.2, 40.0 },
   };
   for (const ScoreItem& item : score.items)
   {

@@ -12,6 +12,7 @@
 #include "LesionWatch.h"
 #include "Scenario.h"
 #include "SessionMetrics.h"
+#include "VesselTears.h"
 
 #include <cstddef>
 #include <string>
@@ -31,10 +32,11 @@ struct ProcedureMoment
   const TickReport& report;
   const SessionMetrics& metrics;
   const CArmPose& pose;
-  bool cine = false;     ///< radiating
-  std::int64_t run = 0;  ///< cine runs that were begun
-  double injected = 0.0; ///< mL
-  std::size_t wire = 0;  ///< number of the wire in use, as WireOf
+  bool cine = false;                              ///< radiating
+  std::int64_t run = 0;                           ///< cine runs that were begun
+  double injected = 0.0;                          ///< mL
+  std::size_t wire = 0;                           ///< number of the wire in use, as WireOf
+  const std::vector<VesselTear>* tears = nullptr; ///< of walls; null: none
 };
 
 class ProcedureWatch

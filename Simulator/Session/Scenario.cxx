@@ -45,7 +45,9 @@ constexpr GoalName GoalNames[] = { { ProcedureStep::Goal::Angiogram, "angiogram"
   { ProcedureStep::Goal::ReserveAbove, "ffr_above", "ffr", 0.0, 1.0 },
   { ProcedureStep::Goal::WireBack, "wire_back", nullptr, 0.0, 0.0 },
   { ProcedureStep::Goal::GuideIn, "guide_in_ostium", nullptr, 0.0, 0.0 },
-  { ProcedureStep::Goal::SideBranchOpen, "side_branch_open", "ffr", 0.0, 1.0 } };
+  { ProcedureStep::Goal::SideBranchOpen, "side_branch_open", "ffr", 0.0, 1.0 },
+  { ProcedureStep::Goal::LeakStopped, "leak_stopped", nullptr, 0.0, 0.0 },
+  { ProcedureStep::Goal::LeakSealed, "leak_sealed", nullptr, 0.0, 0.0 } };
 
 /// A number of the file, its range, and where it goes; one list for reading and writing.
 struct NumberEntry
@@ -66,7 +68,8 @@ std::vector<NumberEntry> NumbersOf(InterventionSettings& s)
     { "wall_friction_factor", &s.wallFriction, 0.0, 10.0 },
     { "wall_stiffness_N_per_mm", &s.wallStiffness, 0.1, 1000.0 },
     { "drag_Pa_s", &s.drag, 0.0, 10.0 }, { "largest_speed_mm_s", &s.maximumSpeed, 1.0, 2000.0 },
-    { "largest_turning_rad_s", &s.maximumTurning, 1.0, 1000.0 } };
+    { "largest_turning_rad_s", &s.maximumTurning, 1.0, 1000.0 },
+    { "perforation_seal_s", &s.sealTime, 1.0, 3600.0 } };
 }
 
 std::vector<NumberEntry> NumbersOf(PhantomSettings& s)
@@ -309,6 +312,7 @@ InterventionSettings SettingsOf(const Json& object, const std::string& where)
     static_cast<int>(fields.Whole("root_branch", -1, 100000, settings.rootBranch));
   settings.guideFromArch = fields.Flag("guide_from_arch", false);
   settings.branchesAnswer = fields.Flag("side_branches_answer", true);
+  settings.wallTears = fields.Flag("wall_tears", true);
   fields.Done();
   try
   {
@@ -329,6 +333,7 @@ Json SettingsToJson(const InterventionSettings& given)
   json["capacity"] = settings.capacity;
   json["root_branch"] = settings.rootBranch;
   json["side_branches_answer"] = settings.branchesAnswer;
+  json["wall_tears"] = settings.wallTears;
   if (settings.guideFromArch)
   {
     json["guide_from_arch"] = true;
@@ -558,7 +563,8 @@ ProcedureStep StepOf(const Json& object, const std::string& where)
     step.goal == ProcedureStep::Goal::WireIn || step.goal == ProcedureStep::Goal::SideBranchOpen
     ? fields.Text("vessel")
     : step.goal == ProcedureStep::Goal::Angiogram || step.goal == ProcedureStep::Goal::WireBack ||
-      step.goal == ProcedureStep::Goal::GuideIn || step.goal == ProcedureStep::Goal::WireTaken
+      step.goal == ProcedureStep::Goal::GuideIn || step.goal == ProcedureStep::Goal::WireTaken ||
+      step.goal == ProcedureStep::Goal::LeakStopped || step.goal == ProcedureStep::Goal::LeakSealed
     ? ""
     : fields.Text("vessel", "");
   if (goal->value)
@@ -751,6 +757,7 @@ Scenario RecordedScenario(const std::string& text, const std::string& origin)
   if (json.is_object() && json.contains("settings") && json["settings"].is_object())
   {
     json["settings"].emplace("side_branches_answer", false);
+    json["settings"].emplace("wall_tears", false);
   }
   return ScenarioFromText(json.dump(), origin, ".");
 }

@@ -64,7 +64,9 @@ struct ProcedureStep
     StenosisBelow,    ///< value: per cent of the diameter, without an open balloon
     ReserveAbove,     ///< value: FFR, likewise
     WireBack,         ///< wires and balloon are in the guide, or `wire` is
-    SideBranchOpen    ///< value: FFR in the side branch `vessel`, without an open balloon
+    SideBranchOpen,   ///< value: FFR in the side branch `vessel`, without an open balloon
+    LeakStopped,      ///< a wall is perforated, and nothing comes out
+    LeakSealed        ///< likewise, and all holes have closed
   };
   Goal goal = Goal::Angiogram;
   std::string text;   ///< what to do, for people

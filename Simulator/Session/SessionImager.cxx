@@ -6,6 +6,7 @@
 #include "Numbers.h"
 #include "PhantomMotion.h"
 #include "RunImages.h"
+#include "TearImage.h"
 #include "VolumeFile.h"
 
 #include <algorithm>
@@ -605,6 +606,11 @@ void SessionImager::ProjectContrast(const SessionSnapshot& snapshot, const CArmG
   if (!clouds.empty())
   {
     AddBlush(clouds, this->NeatContrast, geometry, this->ContrastLayer);
+  }
+  if (!snapshot.tears.empty())
+  {
+    AddTears(snapshot.tears, snapshot.axis, snapshot.lumen, this->NeatContrast, geometry,
+      this->ContrastLayer);
   }
   if (this->Aorta && !snapshot.aorta.empty())
   {

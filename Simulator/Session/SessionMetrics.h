@@ -31,8 +31,15 @@ struct SessionMetrics
   double stShift = 0.0;          ///< mV, now
   double greatestStShift = 0.0;  ///< mV
   double elevatedSeconds = 0.0;  ///< ST segment up by Ischaemia::Elevated or more
-  double wireTurning = 0.0;      ///< radians, left and right together
-  double deepest = 0.0;          ///< mm of wire beyond the catheter's tip
+  ///@{
+  /// Of torn walls, now.
+  double pericardialBlood = 0.0;    ///< mL
+  double pericardialPressure = 0.0; ///< mmHg
+  double strokeShare = 1.0;         ///< of the stroke volume that is left
+  std::int64_t openHoles = 0;       ///< that are not sealed
+  ///@}
+  double wireTurning = 0.0;  ///< radians, left and right together
+  double deepest = 0.0;      ///< mm of wire beyond the catheter's tip
   std::vector<int> branches; ///< in which the tip has been, in the order in which they were reached
   std::vector<ProcedureEvent> events;
 };

@@ -79,6 +79,7 @@ struct TrainingSession::Internals
     , Medium(this->Wall->Topology(), scenario.contrast, scenario.seed)
     , Watch(this->Wall->Topology(), this->Medium, this->Physics.Mouths())
     , Incidents(this->Medium.FlowModel().Network())
+    , Tears(this->Medium.FlowModel().Network(), this->Settings.sealTime)
     , Heart(this->Medium.FlowModel())
     , Clock(AcquisitionOf(scenario))
     , Breath(scenario.imaging.breathing)
@@ -139,6 +140,7 @@ struct TrainingSession::Internals
   void StepContrast(const SessionInput& input);
   double PushedMedium(const SessionInput& input, double seconds);
   void StepGuide(double seconds, double pushed);
+  void StepTears(double seconds);
   void StepIncidents(double seconds, double pushed);
   void Happen(const Incident& incident);
   void BlockWithAir(double volume, const std::string& vessel);
@@ -174,6 +176,7 @@ struct TrainingSession::Internals
   ContrastModel Medium;
   LesionWatch Watch;
   VesselIncidents Incidents;
+  VesselTears Tears;
   std::vector<Incident> Planned; // of the scenario
   std::vector<char> Happened;    // of these
   double InjectedAir = 0.0;      // mL in the aorta, so far
@@ -366,7 +369,11 @@ void TrainingSession::Internals::StepContrast(const SessionInput& input)
   const double seconds = static_cast<double>(this->TicksOfContrast) / this->Settings.tickRate;
   const double pushed = this->PushedMedium(input, seconds);
   this->StepIncidents(seconds, pushed);
-  this->Watch.StepFlow(seconds, this->Physics, this->Incidents, this->Medium);
+  if (this->Settings.wallTears)
+  {
+    this->StepTears(seconds);
+  }
+  this->Watch.StepFlow(seconds, this->Physics, this->Incidents, this->Tears, this->Medium);
   this->StepIschaemia(seconds);
   if (this->Guide)
   {
@@ -380,6 +387,17 @@ void TrainingSession::Internals::StepContrast(const SessionInput& input)
       place >= 0.0     ? place
         : pushed > 0.0 ? this->PlaceInAorta()
                        : 0.0 });
+}
+
+void TrainingSession::Internals::StepTears(double seconds)
+{
+  SessionMetrics& metrics = this->Metrics;
+  this->Tears.Step(seconds, metrics.procedureSeconds, this->Physics, *this->Wall, this->Medium,
+    this->Watch, this->Messages);
+  metrics.pericardialBlood = this->Tears.Sac().Volume();
+  metrics.pericardialPressure = this->Tears.Sac().Pressure();
+  metrics.strokeShare = this->Tears.Sac().StrokeFactor();
+  metrics.openHoles = this->Tears.OpenHoles();
 }
 
 void TrainingSession::Internals::StepIncidents(double seconds, double pushed)
@@ -562,6 +580,11 @@ void TrainingSession::Internals::Measure(const SessionInput& input)
   metrics.maximumTipForce = std::max(metrics.maximumTipForce, tick.tipForce);
   metrics.forcefulSeconds += tick.tipForce > ForcefulTip ? seconds : 0.0;
   metrics.occludedSeconds += tick.balloon.wallPressure > 0.0 ? seconds : 0.0;
+  if (this->Settings.wallTears)
+  {
+    this->Tears.Press(
+      tick.tipThrust, PunctureForce(this->Wires[this->WireNumbers[this->InHand]]), seconds);
+  }
   this->MeasureHands(input);
   metrics.deepest = std::max(metrics.deepest, tick.inserted);
   if (tick.branch >= 0 &&
@@ -653,9 +676,10 @@ void TrainingSession::Internals::MeasureHands(const SessionInput& input)
 void TrainingSession::Internals::StepProcedure()
 {
   const bool lesions = this->Procedure->NeedsLesions();
-  this->Procedure->Step({ this->Report.tick, this->Metrics, this->Pose,
-                          this->Clock.Radiating() && this->Clock.Last().cine, this->Clock.Runs(),
-                          this->Medium.Tracers().Injected(), this->WireNumbers[this->InHand] },
+  this->Procedure->Step(
+    { this->Report.tick, this->Metrics, this->Pose,
+      this->Clock.Radiating() && this->Clock.Last().cine, this->Clock.Runs(),
+      this->Medium.Tracers().Injected(), this->WireNumbers[this->InHand], &this->Tears.All() },
     lesions ? this->Watch.Results(this->Physics, this->Medium) : std::vector<LesionResult>(),
     lesions ? this->Watch.Stents(this->Physics) : std::vector<StentResult>(), this->Messages,
     lesions ? this->Watch.Mouths(this->Physics, this->Medium) : std::vector<MouthResult>());
@@ -861,6 +885,11 @@ std::vector<MouthResult> TrainingSession::Mouths() const
   return this->Data->Watch.Mouths(this->Data->Physics, this->Data->Medium);
 }
 
+const std::vector<VesselTear>& TrainingSession::Tears() const
+{
+  return this->Data->Tears.All();
+}
+
 const ProcedureState& TrainingSession::Procedure() const
 {
   return this->Data->Procedure->State();
@@ -907,6 +936,10 @@ std::uint64_t TrainingSession::StateHash() const
   {
     add(data.Medium.StateHash());
   }
+  if (data.Tears.Any())
+  {
+    hash = data.Tears.Hash(hash);
+  }
   if (data.Guide && data.GuideUsed)
   {
     hash = data.Guide->Hash(hash);
@@ -938,6 +971,7 @@ void TrainingSession::SnapshotOfImage(SessionSnapshot& snapshot) const
   snapshot.report = data.Report.tick;
   snapshot.metrics = data.Metrics;
   snapshot.procedure = data.Procedure->State();
+  snapshot.tears = data.Tears.All();
   snapshot.contrast = data.Balance();
   const AorticContrast& aorta = data.Medium.Aorta();
   snapshot.aorta = aorta.Empty() ? std::vector<double>() : aorta.Concentration();

@@ -18,6 +18,7 @@
 #include "Scenario.h"
 #include "SessionInput.h"
 #include "SessionMetrics.h"
+#include "VesselTears.h"
 #include "VolumeProjector.h"
 
 #include <cstdint>
@@ -75,6 +76,7 @@ struct SessionSnapshot
   std::size_t balloonNumber = 0;    ///< as BalloonOf
   std::vector<StentShape> stents;
   ///@}
+  std::vector<VesselTear> tears;     ///< of walls
   ProcedureState procedure;          ///< of a scenario's steps
   std::vector<LesionResult> lesions; ///< only of SnapshotOfScene
   std::vector<StentResult> results;  ///< only of SnapshotOfScene: of the stents in the wall
@@ -125,6 +127,7 @@ public:
   std::vector<LesionResult> Lesions() const;
   std::vector<StentResult> Stents() const; ///< that are in the wall
   std::vector<MouthResult> Mouths() const; ///< of side branches that are not thin
+  const std::vector<VesselTear>& Tears() const;
   const ProcedureState& Procedure() const;
   /// Of the scenario's procedure, as far as it went.
   ProcedureScore Score() const;

@@ -23,6 +23,7 @@ WallStation MakeWallStation(
   WallStation station;
   station.rest = rest;
   station.reference = std::max(rest, reference);
+  station.calcium = calcium;
   const double burden = 1.0 - rest / station.reference;
   const double share = std::min(1.0, burden / settings.wholePlaque);
   const auto mixed = [&](double soft, double hard)

@@ -35,6 +35,7 @@ struct WallStation
 {
   double rest = 0.0;
   double reference = 0.0;
+  double calcium = 0.0;      ///< part of the circle
   double stiffness = 0.0;    ///< atm, of its plaque; 0: none
   double yield = 0.0;        ///< atm
   double hardening = 0.0;    ///< atm a reference of plastic opening

@@ -28,7 +28,13 @@ void MetricsPanel::ShowMetrics(
     last = name;
   }
   const QString step = QString::fromStdString(next);
-  this->setText((step.isEmpty() ? step : step + "\n") +
+  const QString blood = metrics.pericardialBlood > 0.0
+    ? QString("Pericardium  %1 mL, %2 mmHg    Stroke volume  %3 %\n")
+        .arg(metrics.pericardialBlood, 0, 'f', 0)
+        .arg(metrics.pericardialPressure, 0, 'f', 1)
+        .arg(100.0 * metrics.strokeShare, 0, 'f', 0)
+    : QString();
+  this->setText((step.isEmpty() ? step : step + "\n") + blood +
     QString("Time  %1 s    Fluoroscopy  %2 s (cine %3 s)\nDose  %4 mGy, %5 Gy cm%6, %7 frames\n"
             "Contrast  %8 mL    Greatest wall force  %9 N\n")
       .arg(metrics.procedureSeconds, 0, 'f', 0)

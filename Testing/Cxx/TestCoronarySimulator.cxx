@@ -642,9 +642,9 @@ TEST_F(TestCoronarySimulator, NamesTheProgramForPosing)
 TEST_F(TestCoronarySimulator, PrintsWhatItKnows)
 {
   ASSERT_EQ(this->Run("--list-scenarios"), 0);
-  for (const char* name :
-    { "phantom-lca", "phantom-rca", "hra-lca", "angiogram-lca", "cto-lad", "engage-lca",
-      "lad-bifurcation", "lad-lesion", "lad-stent", "lca-events", "patient-lca", "patient-rca" })
+  for (const char* name : { "phantom-lca", "phantom-rca", "hra-lca", "angiogram-lca", "cto-lad",
+         "engage-lca", "lad-bifurcation", "lad-lesion", "lad-perforation", "lad-stent",
+         "lca-events", "patient-lca", "patient-rca" })
   {
     EXPECT_NE(ReadText(this->Folder / "stdout").find(name), std::string::npos);
   }

@@ -70,7 +70,7 @@ public:
 TEST(UnitTestScenario, BuiltInOnesAreGood)
 {
   const auto list = coronary::BuiltInScenarios();
-  ASSERT_EQ(list.size(), 12U);
+  ASSERT_EQ(list.size(), 13U);
   for (const auto& one : list)
   {
     const Scenario scenario = LoadScenario(one.name);
