@@ -21,15 +21,15 @@ constexpr double IschaemiaFree = 60.0; // s
 
 bool IsOfLesion(Goal goal)
 {
-  return goal == Goal::WireAtLesion || goal == Goal::WireBeyondLesion ||
-    goal == Goal::BalloonInLesion || goal == Goal::StentInLesion || goal == Goal::StenosisBelow ||
-    goal == Goal::ReserveAbove;
+  return goal == Goal::WireAtLesion || goal == Goal::MicrocatheterAtLesion ||
+    goal == Goal::WireBeyondLesion || goal == Goal::BalloonInLesion ||
+    goal == Goal::StentInLesion || goal == Goal::StenosisBelow || goal == Goal::ReserveAbove;
 }
 
 bool NeedsBalloon(Goal goal)
 {
   return goal == Goal::BalloonInLesion || goal == Goal::StentInLesion ||
-    goal == Goal::SideBranchOpen;
+    goal == Goal::SideBranchOpen || goal == Goal::MicrocatheterAtLesion;
 }
 
 /// The step's lesion among the session's.
@@ -169,8 +169,16 @@ bool ProcedureWatch::Reached(const ProcedureMoment& moment,
     case Goal::WireAtLesion:
       return this->IsBehind(lesion->branch, report.branch) &&
         report.catheterTip + report.inserted >= lesion->from - step.value;
+    case Goal::MicrocatheterAtLesion:
+      // The wire's tip says which way it is on.
+      return report.balloon.microcatheter && report.balloon.place >= 0 &&
+        (this->IsBehind(lesion->branch, report.branch) ||
+          this->IsBehind(report.branch, lesion->branch)) &&
+        report.balloon.middle >= lesion->from - step.value;
     case Goal::WireTaken:
       return static_cast<double>(moment.wire) == step.value;
+    case Goal::BalloonTaken:
+      return static_cast<double>(moment.balloon) == step.value;
     case Goal::WireBeyondLesion:
       return this->IsBehind(report.branch, lesion->branch) &&
         report.catheterTip + report.inserted - lesion->to >= step.value;

@@ -31,10 +31,11 @@ struct ProcedureMoment
   const TickReport& report;
   const SessionMetrics& metrics;
   const CArmPose& pose;
-  bool cine = false;     ///< radiating
-  std::int64_t run = 0;  ///< cine runs that were begun
-  double injected = 0.0; ///< mL
-  std::size_t wire = 0;  ///< number of the wire in use, as WireOf
+  bool cine = false;       ///< radiating
+  std::int64_t run = 0;    ///< cine runs that were begun
+  double injected = 0.0;   ///< mL
+  std::size_t wire = 0;    ///< number of the wire in use, as WireOf
+  std::size_t balloon = 0; ///< likewise, as BalloonOf
 };
 
 class ProcedureWatch

@@ -108,6 +108,8 @@ private:
     const SessionSnapshot& snapshot, const std::vector<Vector3>& line, std::size_t number) const;
   void ProjectGuideLumen(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   void ProjectBalloon(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
+  void ProjectMicrocatheter(
+    const BalloonCatheter& device, const std::vector<Vector3>& line, const CArmGeometry& geometry);
   void ProjectStents(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   void ProjectContrast(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   void MoveBackground(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
