@@ -135,7 +135,9 @@ bool BalloonOnWire::Drive(double way, double most, const Rail& rail, double shar
     this->Slid += slid;
   }
   const double furthest = rail.fed - this->WireAhead();
-  const bool free = this->Place <= furthest && this->Place >= this->Start;
+  // A wire that stops at a microcatheter's tip does not push it.
+  const double rounding = this->Balloon.IsMicrocatheter() ? 1e-9 : 0.0;
+  const bool free = this->Place <= furthest + rounding && this->Place >= this->Start;
   this->Place = std::clamp(this->Place, std::min(this->Start, furthest), furthest);
   if (!free)
   {

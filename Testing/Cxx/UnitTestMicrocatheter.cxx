@@ -66,8 +66,7 @@ struct EvenRod
       this->Rod.Append(
         segment, joint, Vector3(0.0, 0.0, this->Places.back()), Eigen::Quaterniond::Identity());
     }
-    this->Rod.Prescribe(
-      count - 1, this->Rod.Position(count - 1), this->Rod.Orientation(count - 1));
+    this->Rod.Prescribe(count - 1, this->Rod.Position(count - 1), this->Rod.Orientation(count - 1));
   }
   static RodSettings Settings()
   {
@@ -225,6 +224,17 @@ std::string OneMessage(Intervention& physics)
   return messages.empty() ? "" : messages.front();
 }
 
+/// Without its shaped tip.
+Guidewire Straight(const char* name)
+{
+  Guidewire wire = Wire(name);
+  for (WireSection& section : wire.sections)
+  {
+    section.restCurvature = 0.0;
+  }
+  return wire;
+}
+
 Guidewire Thick(double radius)
 {
   Guidewire wire = Wire("workhorse");
@@ -326,7 +336,8 @@ TEST(Microcatheter, TheColumnBeyondItBucklesAsEulerSays)
     const double euler = beta * beta / (column * column);
     const double found = BucklingLoad(0.25, column);
     char text[80];
-    std::snprintf(text, sizeof(text), "column of %g mm beyond a microcatheter: N per N mm2", column);
+    std::snprintf(
+      text, sizeof(text), "column of %g mm beyond a microcatheter: N per N mm2", column);
     Print(text, euler, found);
     EXPECT_NEAR(found / euler, 1.0, 0.01) << column;
   }
@@ -365,42 +376,242 @@ TEST(Microcatheter, StraightensTheTipThatIsDrawnIntoIt)
   }
 }
 
-
-namespace
-{
-Guidewire Straight(const char* name)
-{
-  Guidewire wire = Wire(name);
-  for (WireSection& section : wire.sections)
-  {
-    section.restCurvature = 0.0;
-  }
-  return wire;
-}
-}
+// In a vessel of 3 mm, whose wall holds the wire too: N on the cap for 50 ms after 2 mm of push.
 TEST(Microcatheter, SupportsTheWireAtTheCap)
 {
-  for (const bool straight : {true, false})
-  for (const char* wire : { "workhorse", "polymer-jacket", "cto-9gf" })
+  const auto held = [](const Guidewire& wire, double distance)
   {
-    for (const char* name : {"microcatheter-1.8F", "microcatheter-2.6F"})
-    for (const double distance : { -1.0, 10.0, 5.0, 3.0 })
+    Hands hands(wire, distance > 0.0 ? std::optional(Device("microcatheter-2.6F")) : std::nullopt,
+      OccludedTube(100.0));
+    hands.ToCap(0.5, distance);
+    std::vector<double> forces;
+    double most = 0.0;
+    for (int k = 0; k < 2000; ++k)
     {
-      Hands hands(straight ? Straight(wire) : Wire(wire),
-        distance > 0.0 ? std::optional(Device(name)) : std::nullopt,
-        OccludedTube(100.0));
-      hands.ToCap(0.5, distance);
-      std::vector<double> all;
-      std::printf("%d %s, %s at %g mm:", straight, wire, name, distance);
-      for (int k = 0; k < 16; ++k)
+      hands.Move(0.001, 0.0, 2.0);
+      forces.push_back(hands.Physics.Report().capForce);
+      if (forces.size() >= 100)
       {
-        for (int j = 0; j < 500; ++j) { hands.Move(0.001, 0.0, 2.0); all.push_back(hands.Physics.Report().capForce); }
-        double held = 0.0;
-        for (std::size_t n = 100; n < all.size(); ++n) held = std::max(held, *std::min_element(all.begin() + n - 100, all.begin() + n));
-        std::printf(" %.2f", held);
+        most = std::max(most, *std::min_element(forces.end() - 100, forces.end()));
       }
-      std::printf("\n");
     }
+    return most;
+  };
+  for (const bool shaped : { false, true })
+  {
+    const Guidewire wire = shaped ? Wire("workhorse") : Straight("workhorse");
+    const double alone = held(wire, -1.0);
+    const double supported = held(wire, 5.0);
+    std::printf("workhorse with a %s tip, 2 mm of push: %.3f N on the cap, %.3f N with a "
+                "microcatheter at 5 mm\n",
+      shaped ? "shaped" : "straight", alone, supported);
+    EXPECT_GT(alone, 0.01);
+    EXPECT_GT(supported, 1.3 * alone) << shaped;
   }
+}
+
+TEST(Microcatheter, TheWireStopsAtItsTipAndItStays)
+{
+  Hands hands(Wire("workhorse"), Device("microcatheter-1.8F"));
+  hands.ToCap(1.0, 6.0);
+  hands.Wait(0.2);
+  ASSERT_GT(hands.Out(), 4.0);
+  const double tip = hands.Sleeve().tip;
+  hands.Physics.TakeMessages();
+  hands.Move(-30.0, 0.0, 40.0);
+  EXPECT_NE(
+    OneMessage(hands.Physics).find("drawn back to the microcatheter's tip"), std::string::npos);
+  EXPECT_NEAR(hands.Out(), 0.5, 1e-9);
+  EXPECT_NEAR(hands.Sleeve().tip, tip, 0.01);
+  hands.Move(2.0, 0.0, 20.0);
+  EXPECT_NEAR(hands.Out(), 2.5, 1e-9) << "the hand has it at once";
+  // A balloon goes back with the wire.
+  Hands balloon(Wire("workhorse"), Device("semi-compliant-2.0x15"));
+  balloon.Move(40.0, 30.0, 30.0);
+  ASSERT_GT(balloon.Sleeve().tip, 5.0);
+  balloon.Move(-35.0, 0.0, 40.0);
+  EXPECT_NEAR(balloon.Out(), 3.0, 1e-6);
+}
+
+TEST(Microcatheter, WiresAreExchangedThroughIt)
+{
+  Hands hands(Wire("workhorse"), Device("microcatheter-2.6F"));
+  hands.ToCap(0.5, 5.0);
+  hands.Wait(0.2);
+  hands.Physics.TakeMessages();
+  ASSERT_GT(hands.Out(), Intervention::MostOut);
+  const double was = hands.Out();
+  EXPECT_FALSE(hands.Physics.Exchange(Wire("cto-9gf")));
+  char text[80];
+  std::snprintf(text, sizeof(text),
+    "the wire is not exchanged: its tip is beyond the microcatheter's by %.1f mm", was);
+  EXPECT_NE(OneMessage(hands.Physics).find(text), std::string::npos);
+  EXPECT_EQ(hands.Physics.Wire().name, "workhorse");
+  EXPECT_FALSE(hands.Physics.Exchange(Device("semi-compliant-2.0x15")));
+  EXPECT_NE(
+    OneMessage(hands.Physics).find("the microcatheter is not exchanged"), std::string::npos);
+
+  hands.Move(-(was - 2.0), 0.0, 20.0);
+  hands.Wait(0.2);
+  const std::vector<Vector3> before = hands.Physics.Centerline();
+  const double sleeve = hands.Sleeve().tip;
+  EXPECT_TRUE(hands.Physics.Exchange(Wire("cto-9gf")));
+  EXPECT_EQ(hands.Physics.Wire().name, "cto-9gf");
+  const std::vector<Vector3> after = hands.Physics.Centerline();
+  ASSERT_EQ(after.size(), before.size());
+  for (std::size_t n = 0; n < after.size(); ++n)
+  {
+    EXPECT_LT((after[n] - before[n]).norm(), 1e-9);
+  }
+  hands.Wait(0.5);
+  EXPECT_NEAR(hands.Tip(), before.front().z(), 0.1);
+  EXPECT_NEAR(hands.Sleeve().tip, sleeve, 1e-9);
+  EXPECT_LT(std::abs(hands.Physics.Report().proximalTorque), 0.02) << "it is not twisted";
+
+  // And on, with the microcatheter behind it.
+  hands.Move(14.0, 0.0, 4.0);
+  EXPECT_TRUE(hands.Physics.Plugs()[0].IsCrossed());
+  hands.Move(0.0, 12.0, 4.0);
+  EXPECT_GT(hands.Sleeve().middle, Cap + 5.0) << "through the channel";
+  hands.Move(0.0, -60.0, 20.0);
+  EXPECT_TRUE(hands.Physics.Exchange(Device("semi-compliant-2.0x15")));
+  EXPECT_FALSE(hands.Physics.Report().balloon.microcatheter);
+}
+
+TEST(Microcatheter, HasNoBalloon)
+{
+  Hands hands(Wire("workhorse"), Device("microcatheter-1.8F"));
+  hands.ToCap(1.0, 6.0);
+  hands.Physics.TakeMessages();
+  for (const int time : { 1, 2 })
+  {
+    hands.Input.inflation = 6.0;
+    hands.Wait(2.5);
+    EXPECT_NE(OneMessage(hands.Physics).find("has no balloon"), std::string::npos) << time;
+    EXPECT_EQ(hands.Sleeve().pressure, 0.0);
+    hands.Input.inflation = -0.9;
+    hands.Wait(0.5);
+    EXPECT_TRUE(hands.Physics.TakeMessages().empty());
+  }
+}
+
+TEST(Microcatheter, TakesItsPartOfTheLumen)
+{
+  const BalloonCatheter& device = Device("microcatheter-2.6F");
+  Hands hands(Wire("workhorse"), device);
+  hands.ToCap(1.0, 6.0);
+  hands.Wait(0.1);
+  const auto& sections = hands.Physics.Balloon()->Sections();
+  ASSERT_GT(sections.size(), 20U);
+  for (const auto& [point, radius] : sections)
+  {
+    const double behind = hands.Sleeve().middle - 0.5 * static_cast<double>(point);
+    EXPECT_NEAR(radius, device.FoldedRadius(behind), 1e-3) << behind;
+    EXPECT_EQ(hands.Physics.Dilated()->Radii()[point], 1.5);
+  }
+  EXPECT_NEAR(hands.Sleeve().middle, Cap - 6.0, 0.2) << "of its tip";
+}
+
+TEST(Microcatheter, WhatDoesNotFitIsRefusedByName)
+{
+  const BalloonCatheter& device = Device("microcatheter-2.6F");
+  ExpectRefusal(
+    [&] { Hands hands(Thick(0.2), device); }, "'thick'", "'microcatheter-2.6F'", "lumen");
+  Hands hands(Wire("workhorse"), device);
+  ExpectRefusal([&] { hands.Physics.Exchange(Thick(0.2)); }, "'thick'", "'microcatheter-2.6F'");
+  Hands wide(Thick(0.2), Device("semi-compliant-2.0x15"));
+  ExpectRefusal([&] { wide.Physics.Exchange(device); }, "'thick'", "'microcatheter-2.6F'");
+  const GuideCatheter& narrow = BuiltInCatalogue().Catheter("JL4-4F").catheter;
+  EXPECT_NO_THROW(Intervention(OccludedTube(), Wire("workhorse"), narrow, Hands::AtRest(), device));
+  ExpectRefusal(
+    [&]
+    {
+      Intervention(
+        OccludedTube(), Wire("workhorse"), narrow, Hands::AtRest(), device, Wire("extra-support"));
+    },
+    "the microcatheter 'microcatheter-2.6F'", "do not fit beside each other", "'JL4-4F'");
+  Scenario scenario = LoadScenario("cto-microcatheter");
+  scenario.procedure.clear();
+  scenario.artery = "any";
+  EXPECT_NO_THROW(TrainingSession(OccludedTube(), scenario));
+  scenario.wireExchanges.push_back(Thick(0.2));
+  ExpectRefusal(
+    [&] { TrainingSession(OccludedTube(), scenario); }, "'thick'", "'microcatheter-2.6F'");
+}
+
+TEST(Microcatheter, BitsRepeat)
+{
+  const auto run = [](const char* name)
+  {
+    Hands hands(Wire("workhorse"), Device(name));
+    hands.ToCap(0.5, 5.0);
+    hands.Move(-8.0, 0.0, 20.0);
+    EXPECT_TRUE(hands.Physics.Exchange(Wire("cto-9gf")));
+    hands.Move(6.0, 2.0, 10.0);
+    return hands.Physics.StateHash();
+  };
+  EXPECT_EQ(run("microcatheter-2.6F"), run("microcatheter-2.6F"));
+  EXPECT_NE(run("microcatheter-2.6F"), run("microcatheter-1.8F"));
+}
+
+// Recorded hands: an angiogram, a workhorse to the occlusion, the CTO wire through the microcatheter, a balloon, a stent.
+TEST(MicrocatheterProcedure, TheRecordedOneRepeatsToTheBit)
+{
+  auto source = std::make_unique<ReplaySource>(
+    std::string(DYNAMICCORONARY_SOURCE_DIR) + "/Testing/Data/Driving/cto-microcatheter.pcirec");
+  const ReplaySource* replay = source.get();
+  const Scenario scenario = RecordedScenario(source->Reader().Header().scenario, "The recording");
+  const auto wall = std::make_shared<NarrowedWallMotion>(
+    MakePhantomWallMotion(scenario.vessels.phantom, scenario.vessels.phantom.surfaceSpacing, 40),
+    scenario.lesions);
+  const std::uint64_t hash = WallHash(*wall);
+  ASSERT_EQ(hash, source->Reader().Header().meshHash);
+  SessionRunner runner(wall, scenario, hash, std::move(source));
+  const Intervention& instruments = runner.Session().Instruments();
+  int outside = 0;
+  double deepest = 0.0;
+  double furthest = 0.0; // mm from the ostium, of the microcatheter's tip
+  std::string name;      // of the wire
+  Vector3 tip = Vector3::Zero();
+  double sleeve = 0.0;
+  double moved = 0.0; // mm of the wire's tip in the tick in which the wire is exchanged
+  double slid = 0.0;  // likewise, of the microcatheter
+  runner.afterTick = [&](const SessionReport& report)
+  {
+    outside += report.tick.outside;
+    deepest = std::max(deepest, report.tick.maximumPenetration);
+    const Vector3 now = instruments.Centerline().front();
+    if (!name.empty() && instruments.Wire().name != name)
+    {
+      moved = (now - tip).norm();
+      slid = std::abs(report.tick.balloon.tip - sleeve);
+    }
+    name = instruments.Wire().name;
+    tip = now;
+    sleeve = report.tick.balloon.tip;
+    furthest =
+      report.tick.balloon.microcatheter ? std::max(furthest, report.tick.balloon.middle) : furthest;
+  };
+  while (runner.Run(1000))
+  {
+  }
+  EXPECT_EQ(replay->Reader().HowEnded(), RecordingReader::Ending::Complete);
+  EXPECT_GT(runner.Compared().compared, 50U);
+  EXPECT_EQ(runner.Compared().equal, runner.Compared().compared)
+    << "from tick " << runner.Compared().firstDifference;
+  EXPECT_EQ(outside, 0);
+  EXPECT_LT(deepest, 0.25);
+  EXPECT_EQ(name, "cto-9gf");
+  EXPECT_GT(moved, 0.0);
+  EXPECT_LT(moved, 0.1);
+  EXPECT_LT(slid, 0.1);
+  EXPECT_TRUE(instruments.Plugs().at(0).IsCrossed());
+  const std::vector<LesionResult> lesions = runner.Session().Lesions();
+  ASSERT_EQ(lesions.size(), 1U);
+  EXPECT_GT(furthest, lesions[0].to - 3.0) << "it follows the wire through the occlusion";
+  EXPECT_LT(lesions[0].degree, 0.3);
+  EXPECT_GT(lesions[0].reserve, 0.9);
+  EXPECT_EQ(runner.Session().Procedure().reached.size(), 10U);
+  EXPECT_TRUE(runner.Session().Score().passed);
 }
 }
