@@ -41,8 +41,8 @@ RodJoint EnteredJoint(const RodJoint& wire, double stiffness, double part)
   RodJoint joint = wire;
   for (int axis = 0; axis < 2; ++axis)
   {
-    joint.angularStiffness[axis] = 1.0 /
-      ((1.0 - part) / wire.angularStiffness[axis] + part / within.angularStiffness[axis]);
+    joint.angularStiffness[axis] =
+      1.0 / ((1.0 - part) / wire.angularStiffness[axis] + part / within.angularStiffness[axis]);
     joint.restAngle[axis] = (1.0 - part) * wire.restAngle[axis] + part * within.restAngle[axis];
   }
   return joint;
@@ -184,7 +184,7 @@ bool BalloonOnWire::Drive(double way, double most, const Rail& rail, double shar
     const double bending = part > 0.0 && middle <= this->Balloon.monorail
       ? this->Balloon.BendingStiffness(middle, this->Pressure, this->RadiusAt(middle))
       : 0.0;
-    rod.Joint(i - 1) = bending <= 0.0     ? joint
+    rod.Joint(i - 1) = bending <= 0.0   ? joint
       : this->Balloon.IsMicrocatheter() ? EnteredJoint(joint, bending / apart, part)
                                         : SleevedJoint(joint, part * bending / apart);
   }
