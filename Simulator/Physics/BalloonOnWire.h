@@ -73,8 +73,8 @@ RodJoint EnteredJoint(const RodJoint& wire, double stiffness, double part);
  * Balloon, stent and wall are at balance in each section of the axis: free radius at (p - p_stent(R) - p_wall(R + strut)) = R.
  * The balloon fills through a resistance: dV/dt = (p_hand - p) / R, V that of all sections.
  *
- * The wire's tip stays WireAhead before the sleeve's. A balloon that the wire is drawn into goes back with it; a microcatheter is
- * held by its hand, and the wire stops there: it does not lead the wire.
+ * The wire's tip stays WireAhead before the sleeve's. A balloon that the wire is drawn into goes back with it; a microcatheter out
+ * of the guide is held by its hand, and the wire stops there: it does not lead the wire.
  *
  * A stent goes with its balloon until the pressure opens it; from then on its rings belong to the wall where it is. Before all of
  * it is out of the guide, the balloon takes no pressure.

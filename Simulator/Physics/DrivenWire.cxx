@@ -319,7 +319,9 @@ void DrivenWire::Feed()
     this->Say(Notice::WireAtTip);
     this->Fed_ = minimum;
   }
-  if (this->Sleeve && this->Fed_ < this->Sleeve->LeastWire())
+  // In the guide it goes back with the wire.
+  if (this->Sleeve && this->Sleeve->Tip() > this->Room.catheterTip &&
+    this->Fed_ < this->Sleeve->LeastWire())
   {
     this->Say(Notice::WireAtMicrocatheter);
     this->Fed_ = this->Sleeve->LeastWire();
