@@ -244,7 +244,7 @@ ProcedureScore ScoreOf(const std::vector<ProcedureStep>& steps, const ProcedureS
   {
     score.failures.push_back("not done: " + steps[n].text);
   }
-  if (last.balloon.wallPressure > 0.0)
+  if (last.balloon.wallPressure > 0.0 && !last.balloon.microcatheter)
   {
     score.failures.emplace_back("a balloon is left open in the vessel");
   }

@@ -24,7 +24,7 @@ constexpr double BraidShare =
 constexpr double InnerTube =
   0.28; // mm: outer radius of the wire's lumen in a balloon, that its markers are on
 constexpr double MarkerThickness = 0.04;    // mm of platinum
-constexpr double MicrocatheterBraid = 0.05; // of its wall that is steel
+constexpr double TipMarkerThickness = 0.06; // mm, likewise of a microcatheter: seen beside a coil
 constexpr double BlushSigma = 7.0;          // mm of the myocardium behind an outlet
 constexpr double FaintestBlush = 1e-5;      // mL
 constexpr double CoarseThorax = 4.0;        // mm between the voxels that the exposure control sees
@@ -472,8 +472,8 @@ void SessionImager::ProjectBalloon(const SessionSnapshot& snapshot, const CArmGe
 void SessionImager::ProjectMicrocatheter(
   const BalloonCatheter& device, const std::vector<Vector3>& line, const CArmGeometry& geometry)
 {
-  const double wall = (1.0 - MicrocatheterBraid) * this->Materials.Of(XRayMaterial::Nylon) +
-    MicrocatheterBraid * this->Materials.Of(XRayMaterial::StainlessSteel);
+  const double wall = (1.0 - BraidShare) * this->Materials.Of(XRayMaterial::Nylon) +
+    BraidShare * this->Materials.Of(XRayMaterial::StainlessSteel);
   const double platinum = this->Materials.Of(XRayMaterial::Platinum);
   InstrumentChain shaft{ line, {} };
   InstrumentChain marker = shaft;
@@ -485,7 +485,7 @@ void SessionImager::ProjectMicrocatheter(
     shaft.segments.push_back({ device.FoldedRadius(middle), device.innerRadius, wall });
     const bool marked = std::abs(middle - device.markerPlace) <= 0.5 * device.markerLength;
     marker.segments.push_back(
-      { device.innerRadius + MarkerThickness, device.innerRadius, marked ? platinum : 0.0 });
+      { device.innerRadius + TipMarkerThickness, device.innerRadius, marked ? platinum : 0.0 });
     behind += length;
   }
   AddInstrument(shaft, geometry, this->InstrumentLayer);
