@@ -82,7 +82,7 @@ void Request::Declare(CLI::App& app)
     ->group(what);
   app
     .add_option("--balloon", this->session.balloon,
-      "Balloon of the built-in catalogue in place of the scenario's")
+      "Balloon or microcatheter of the built-in catalogue in place of the scenario's")
     ->type_name("NAME")
     ->group(what);
   auto* heartRate = app

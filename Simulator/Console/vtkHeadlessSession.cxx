@@ -959,5 +959,10 @@ void ListInstruments()
       one.balloon.name.c_str(), 2.0 * one.balloon.FreeRadius(one.balloon.nominalPressure),
       one.balloon.nominalPressure, one.description.c_str());
   }
+  for (const CatalogueBalloon& one : BuiltInCatalogue().microcatheters)
+  {
+    std::printf("microcatheter %-18s %4.2f mm, tip %4.2f mm  %s\n", one.balloon.name.c_str(),
+      2.0 * one.balloon.Profile(), 2.0 * one.balloon.tipRadius, one.description.c_str());
+  }
 }
 }

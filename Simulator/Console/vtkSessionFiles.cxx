@@ -89,8 +89,8 @@ void WriteInstruments(const std::string& path, const Intervention& intervention,
   intervention.BalloonLine(balloon, radii);
   std::size_t next = 0;
   AddLine(
-    balloon, 2, [&](double) { return radii[next++]; }, points, lines, radius, abscissa,
-    instruments);
+    balloon, intervention.Report().balloon.microcatheter ? 5 : 2,
+    [&](double) { return radii[next++]; }, points, lines, radius, abscissa, instruments);
   std::vector<StentShape> stents;
   intervention.StentShapes(stents);
   for (const StentShape& stent : stents)

@@ -20,7 +20,7 @@ namespace coronary
 /**
  * Wire, catheter and, where there is one out of it, balloon catheter as polylines from their tips, stents from their ends near the
  * ostium. Point data: MaximumInscribedSphereRadius (that of the instrument, inside of a stent, mm), Abscissas (mm from the line's
- * beginning). Cell data: Instrument (0 wire, 1 catheter, 2 balloon, 3 stent). Field data:
+ * beginning). Cell data: Instrument (0 wire, 1 catheter, 2 balloon, 3 stent, 4 second wire, 5 microcatheter). Field data:
  * Tick, PhaseTime, Inserted, and the forces of TickReport.
  * @throws std::runtime_error naming the file
  */

@@ -11,9 +11,11 @@ namespace coronary
 {
 namespace
 {
-constexpr double WireAhead = 3.0;      // mm of the wire before the sleeve's tip at least
-constexpr double FrictionGives = 0.05; // mm after which the sleeve slides on the wire
-constexpr double TipBlend = 1.0;       // mm on which the wire's radius becomes the tip's
+constexpr double BeforeBalloon = 3.0; // mm of the wire before the sleeve's tip at least
+/// The first segment is bare, so that it is the wire's tip that meets an occlusion.
+constexpr double BeforeMicrocatheter = 0.5; // mm, likewise
+constexpr double FrictionGives = 0.05;      // mm after which the sleeve slides on the wire
+constexpr double TipBlend = 1.0;            // mm on which the wire's radius becomes the tip's
 // The wall takes an opened balloon's shape, and the rod's contacts do not know: for them it is thinner.
 constexpr double FeltOpening = 0.75;
 constexpr double Slack = 0.05;      // mm, likewise of what is folded: it holds narrow vessels open
@@ -33,6 +35,19 @@ RodJoint SleevedJoint(const RodJoint& wire, double stiffness)
   return joint;
 }
 
+RodJoint EnteredJoint(const RodJoint& wire, double stiffness, double part)
+{
+  const RodJoint within = SleevedJoint(wire, stiffness);
+  RodJoint joint = wire;
+  for (int axis = 0; axis < 2; ++axis)
+  {
+    joint.angularStiffness[axis] =
+      1.0 / ((1.0 - part) / wire.angularStiffness[axis] + part / within.angularStiffness[axis]);
+    joint.restAngle[axis] = (1.0 - part) * wire.restAngle[axis] + part * within.restAngle[axis];
+  }
+  return joint;
+}
+
 BalloonOnWire::BalloonOnWire(
   const BalloonCatheter& balloon, const GuideCatheter& guide, double start)
   : System(balloon)
@@ -43,13 +58,15 @@ BalloonOnWire::BalloonOnWire(
   , HandPlace(start)
 {
   this->Report_.crimped = balloon.stent.has_value();
+  this->Report_.microcatheter = balloon.IsMicrocatheter();
   const auto count = static_cast<std::size_t>(std::ceil(balloon.Reach() / Spacing)) + 2;
   for (std::size_t n = 0; n < count; ++n)
   {
     this->OuterNext.push_back(this->FoldedAt(static_cast<double>(n) * Spacing));
   }
   this->OuterNow = this->OuterNext;
-  this->Report_.least = this->Report_.greatest = 2.0 * balloon.crossingRadius;
+  this->Report_.least = this->Report_.greatest =
+    2.0 * (balloon.IsMicrocatheter() ? balloon.Profile() : balloon.crossingRadius);
   if (balloon.stent)
   {
     // Where the first ring flows.
@@ -69,8 +86,17 @@ bool BalloonOnWire::Crimped(double behind) const
     std::abs(behind - this->Balloon.Middle()) <= 0.5 * this->System.stent->CrimpedLength();
 }
 
+double BalloonOnWire::WireAhead() const
+{
+  return this->Balloon.IsMicrocatheter() ? BeforeMicrocatheter : BeforeBalloon;
+}
+
 double BalloonOnWire::RadiusAt(double behind) const
 {
+  if (this->Balloon.IsMicrocatheter())
+  {
+    return this->Balloon.FoldedRadius(behind);
+  }
   const double place = behind / Spacing;
   const auto n = static_cast<std::size_t>(std::max(0.0, place));
   if (n + 1 >= this->OuterNow.size())
@@ -94,7 +120,8 @@ bool BalloonOnWire::Drive(double way, double most, const Rail& rail, double shar
   // A balloon that the wall holds goes with it, along the wire.
   this->Place += this->Carry * (share - std::min(share, this->Share));
   this->Share = share;
-  const double inflated = std::clamp(this->Pressure / this->Balloon.ratedPressure, 0.0, 1.0);
+  const double inflated =
+    this->Pressure > 0.0 ? std::clamp(this->Pressure / this->Balloon.ratedPressure, 0.0, 1.0) : 0.0;
   const double onWire = this->Balloon.wireFriction + inflated * this->Balloon.inflatedFriction;
   const double resist = onWire + this->Rubbing + this->Report_.grip;
   const double stiffness = this->Balloon.pushStiffness;
@@ -107,8 +134,10 @@ bool BalloonOnWire::Drive(double way, double most, const Rail& rail, double shar
     this->Place += slid;
     this->Slid += slid;
   }
-  const double furthest = rail.fed - WireAhead;
-  const bool free = this->Place <= furthest && this->Place >= this->Start;
+  const double furthest = rail.fed - this->WireAhead();
+  // A wire that stops at a microcatheter's tip does not push it.
+  const double rounding = this->Balloon.IsMicrocatheter() ? 1e-9 : 0.0;
+  const bool free = this->Place <= furthest + rounding && this->Place >= this->Start;
   this->Place = std::clamp(this->Place, std::min(this->Start, furthest), furthest);
   if (!free)
   {
@@ -155,7 +184,9 @@ bool BalloonOnWire::Drive(double way, double most, const Rail& rail, double shar
     const double bending = part > 0.0 && middle <= this->Balloon.monorail
       ? this->Balloon.BendingStiffness(middle, this->Pressure, this->RadiusAt(middle))
       : 0.0;
-    rod.Joint(i - 1) = bending > 0.0 ? SleevedJoint(joint, part * bending / apart) : joint;
+    rod.Joint(i - 1) = bending <= 0.0   ? joint
+      : this->Balloon.IsMicrocatheter() ? EnteredJoint(joint, bending / apart, part)
+                                        : SleevedJoint(joint, part * bending / apart);
   }
   return free;
 }
@@ -291,6 +322,14 @@ void BalloonOnWire::Inflate(double seconds, double pressure, double place, doubl
     add(way.points[n], at, 0.5 * (to - from));
   }
 
+  if (this->Balloon.IsMicrocatheter())
+  {
+    this->FillAt(0.0, wall);
+    const double wide = this->Report_.greatest;
+    this->Summarize(wall);
+    this->Report_.least = this->Report_.greatest = wide;
+    return;
+  }
   const double filled = this->Filled;
   const double flow = seconds / this->Balloon.inflationResistance;
   this->Pressure =

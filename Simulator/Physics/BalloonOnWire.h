@@ -1,7 +1,7 @@
 /**
  * @file BalloonOnWire.h
- * @brief A balloon catheter as a sleeve on the simulated wire, its balloon against the vessel's wall, and the stent that it
- * leaves there.
+ * @brief A balloon catheter or microcatheter as a sleeve on the simulated wire, its balloon against the vessel's wall, and the
+ * stent that it leaves there.
  */
 #ifndef DynamicCoronary_BalloonOnWire_h
 #define DynamicCoronary_BalloonOnWire_h
@@ -11,6 +11,7 @@
 #include "Instrument.h"
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -21,6 +22,7 @@ namespace coronary
 /// Of one tick.
 struct BalloonReport
 {
+  bool microcatheter = false; ///< it is one: middle and place are those of its tip
   double tip = 0.0;      ///< mm of the balloon catheter's tip beyond the guide's; negative: within
   double pressure = 0.0; ///< atm in the balloon
   double force = 0.0;    ///< N at the hand, against advancing
@@ -57,6 +59,9 @@ struct PlacedStent
 /// A joint of a wire within a straight sleeve: stiffnesses add, and what is curved at rest is straightened.
 /// @param stiffness  N mm/rad of the sleeve, about each axis across
 RodJoint SleevedJoint(const RodJoint& wire, double stiffness);
+/// Likewise of one that a sleeve's end is in: both pieces bend, one behind the other, by the same moment.
+/// @param part  of it that is within, 0 to 1
+RodJoint EnteredJoint(const RodJoint& wire, double stiffness, double part);
 
 /**
  * The sleeve does not stretch on the wire and is bent with it; it takes no torsion. Places along the way are those of the
@@ -67,6 +72,9 @@ RodJoint SleevedJoint(const RodJoint& wire, double stiffness);
  *
  * Balloon, stent and wall are at balance in each section of the axis: free radius at (p - p_stent(R) - p_wall(R + strut)) = R.
  * The balloon fills through a resistance: dV/dt = (p_hand - p) / R, V that of all sections.
+ *
+ * The wire's tip stays WireAhead before the sleeve's. A balloon that the wire is drawn into goes back with it; a microcatheter out
+ * of the guide is held by its hand, and the wire stops there: it does not lead the wire.
  *
  * A stent goes with its balloon until the pressure opens it; from then on its rings belong to the wall where it is. Before all of
  * it is out of the guide, the balloon takes no pressure.
@@ -111,6 +119,12 @@ public:
   /// The stent that was left in the wall since the last call.
   std::optional<PlacedStent> TakePlaced() { return std::exchange(this->Placed, std::nullopt); }
   double Tip() const { return this->Place; } ///< u
+  /// u that the wire's tip can be drawn back to: of a microcatheter.
+  double LeastWire() const
+  {
+    return this->Balloon.IsMicrocatheter() ? this->Place + this->WireAhead()
+                                           : -std::numeric_limits<double>::infinity();
+  }
   bool Covers(double behind) const { return behind >= 0.0 && behind <= this->Balloon.monorail; }
   const BalloonReport& Report() const { return this->Report_; }
   /// mm, outside, now: `spacing` from each other from the tip on.
@@ -140,6 +154,7 @@ private:
     bool crimped = false; ///< a stent holds it folded
   };
 
+  double WireAhead() const; ///< mm
   double FoldedAt(double behind) const
   {
     return this->Report_.crimped ? this->System.CrimpedRadius(behind)

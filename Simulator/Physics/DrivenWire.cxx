@@ -91,6 +91,31 @@ void DrivenWire::Take(const Guidewire& wire)
   this->KeepSane();
 }
 
+void DrivenWire::TakeAlong(const Guidewire& wire)
+{
+  this->KeepSane();
+  this->Wire = wire;
+  this->MakeSegments(); // as long as the last one's, all of them
+  this->HandAngle = this->Last.angle;
+  this->Behind = WireInGuide(wire, this->Room.catheter, this->Room.settings.insideCatheter);
+  this->DriveBehind();
+  this->Behind.Rest(this->HandAngle, this->HandAngle);
+  this->DriveBehind();
+  std::vector<Eigen::Quaterniond>& frames = this->Last.orientation;
+  const auto axis = [&](std::size_t i) { return Vector3(frames[i] * Vector3::UnitZ()); };
+  for (std::size_t i = frames.size() - 1; i-- > 0;)
+  {
+    frames[i] = Eigen::Quaterniond::FromTwoVectors(axis(i + 1), axis(i)) * frames[i + 1];
+  }
+  this->Rod_ = CosseratRod(this->Room.settings.capacity, InstrumentRod());
+  for (std::size_t i = 0; i < frames.size(); ++i)
+  {
+    this->Rod_.Append(this->Segments_[i], this->Joints[i], this->Last.position[i], frames[i]);
+  }
+  const std::int64_t last = this->Rod_.Size() - 1;
+  this->Rod_.Prescribe(last, this->Rod_.Position(last), this->Rod_.Orientation(last));
+}
+
 void DrivenWire::MakeSegments()
 {
   this->Segments_.clear();
@@ -293,6 +318,13 @@ void DrivenWire::Feed()
   {
     this->Say(Notice::WireAtTip);
     this->Fed_ = minimum;
+  }
+  // In the guide it goes back with the wire.
+  if (this->Sleeve && this->Sleeve->Tip() > this->Room.catheterTip &&
+    this->Fed_ < this->Sleeve->LeastWire())
+  {
+    this->Say(Notice::WireAtMicrocatheter);
+    this->Fed_ = this->Sleeve->LeastWire();
   }
   const double most = datum + this->Places_[this->Room.settings.capacity - 1];
   if (this->Fed_ > most)

@@ -45,6 +45,8 @@ public:
 
   /// Another wire in its place, its tip where this one's was: both turned as the hand is, and at rest.
   void Take(const Guidewire& wire);
+  /// Likewise through the sleeve: the new one lies as this one did. It is not twisted: its hand holds it as it came.
+  void TakeAlong(const Guidewire& wire);
   /// A balloon runs on it; null: none does. It has to live until another one is set.
   void SetSleeve(BalloonOnWire* sleeve) { this->Sleeve = sleeve; }
 

@@ -35,6 +35,16 @@ void RequirePieces(
   }
 }
 
+double Thickest(const Guidewire& wire)
+{
+  double radius = 0.0;
+  for (const WireSection& section : wire.sections)
+  {
+    radius = std::max(radius, section.radius);
+  }
+  return radius;
+}
+
 void RequireThinner(const std::string& what, double thick, const GuideCatheter& catheter)
 {
   if (thick >= catheter.innerRadius)
@@ -51,7 +61,8 @@ void RequireThinner(const std::string& what, double thick, const GuideCatheter& 
 void RequireFit(const BalloonCatheter& balloon, const GuideCatheter& catheter)
 {
   balloon.Validate();
-  RequireThinner("the balloon '" + balloon.name + "'", balloon.Profile(), catheter);
+  RequireThinner(
+    std::string("the ") + balloon.Kind() + " '" + balloon.name + "'", balloon.Profile(), catheter);
 }
 
 void RequireFit(const Guidewire& wire, const GuideCatheter& catheter)
@@ -63,23 +74,32 @@ void RequireFit(const Guidewire& wire, const GuideCatheter& catheter)
   }
 }
 
+void RequireFit(const Guidewire& wire, const BalloonCatheter& around)
+{
+  const double thickest = Thickest(wire);
+  if (around.IsMicrocatheter() && thickest >= around.innerRadius)
+  {
+    char text[256];
+    std::snprintf(text, sizeof(text),
+      "the wire '%s' is thicker (radius %.3f mm) than the lumen of the microcatheter '%s' (radius "
+      "%.3f mm)",
+      wire.name.c_str(), thickest, around.name.c_str(), around.innerRadius);
+    throw std::invalid_argument(text);
+  }
+}
+
 void RequireFitBeside(
   const BalloonCatheter& balloon, const Guidewire& wire, const GuideCatheter& catheter)
 {
-  double thickest = 0.0;
-  for (const WireSection& section : wire.sections)
-  {
-    thickest = std::max(thickest, section.radius);
-  }
+  const double thickest = Thickest(wire);
   if (balloon.Profile() + thickest > catheter.innerRadius)
   {
     char text[300];
     std::snprintf(text, sizeof(text),
-      "the balloon '%s' (%.2f mm) and the wire '%s' (%.2f mm) do not fit beside each other into "
-      "the "
+      "the %s '%s' (%.2f mm) and the wire '%s' (%.2f mm) do not fit beside each other into the "
       "catheter '%s' (%.2f mm inside)",
-      balloon.name.c_str(), 2.0 * balloon.Profile(), wire.name.c_str(), 2.0 * thickest,
-      catheter.name.c_str(), 2.0 * catheter.innerRadius);
+      balloon.Kind(), balloon.name.c_str(), 2.0 * balloon.Profile(), wire.name.c_str(),
+      2.0 * thickest, catheter.name.c_str(), 2.0 * catheter.innerRadius);
     throw std::invalid_argument(text);
   }
 }
@@ -262,8 +282,52 @@ StentRing StentDesign::CrimpedRing() const
   return ring;
 }
 
+namespace
+{
+void ValidateMicrocatheter(const BalloonCatheter& device)
+{
+  const std::string whose = "Microcatheter '" + device.name + "'";
+  Require(device.monorail, 500.0, 2000.0, whose, "the length", "mm");
+  Require(device.innerRadius, 0.1, 1.0, whose, "the inner radius", "mm");
+  Require(device.tipLength, 0.1, 50.0, whose, "the tip's length", "mm");
+  Require(device.markerLength, 0.1, 5.0, whose, "the marker's length", "mm");
+  Require(device.markerPlace, 0.5 * device.markerLength, 50.0, whose, "the marker's place", "mm");
+  Require(device.pushStiffness, 1e-3, 1e3, whose, "the push stiffness", "N/mm");
+  Require(device.wireFriction, 0.0, 5.0, whose, "the friction on the wire", "N");
+  Require(device.friction, 0.0, 2.0, whose, "the friction", "");
+  RequirePieces(device.sections.size(), 1, whose, "sections");
+  double sum = 0.0;
+  for (std::size_t n = 0; n < device.sections.size(); ++n)
+  {
+    const MicrocatheterSection& section = device.sections[n];
+    const std::string part = whose + ", section " + std::to_string(n + 1);
+    if (n > 0 && sum >= device.monorail)
+    {
+      throw std::invalid_argument(part + " begins behind the microcatheter's end.");
+    }
+    Require(section.length, 0.1, 2000.0, part, "the length", "mm");
+    Require(section.outerRadius, device.innerRadius + 0.01, 1.5, part,
+      "the outer radius (its lumen fits into it)", "mm");
+    Require(section.bendingStiffness, 1e-3, 1e3, part, "the bending stiffness", "N mm^2");
+    sum += section.length;
+  }
+  Require(device.tipRadius, device.innerRadius, device.sections.front().outerRadius, whose,
+    "the tip's radius", "mm");
+}
+
+double OuterRadius(const MicrocatheterSection& section)
+{
+  return section.outerRadius;
+}
+}
+
 void BalloonCatheter::Validate() const
 {
+  if (this->IsMicrocatheter())
+  {
+    ValidateMicrocatheter(*this);
+    return;
+  }
   const std::string whose = "Balloon '" + this->name + "'";
   Require(this->length, 4.0, 60.0, whose, "the length", "mm");
   Require(this->tipLength, 1.0, 30.0, whose, "the tip's length", "mm");
@@ -322,6 +386,10 @@ double BalloonCatheter::FreeRadius(double pressure) const
 
 double BalloonCatheter::Shape(double behind) const
 {
+  if (this->IsMicrocatheter())
+  {
+    return 0.0;
+  }
   const double before = this->tipLength - behind;
   const double after = behind - this->tipLength - this->length;
   const double beyond = std::max({ 0.0, before, after }) / this->shoulder;
@@ -335,6 +403,11 @@ double BalloonCatheter::FoldedRadius(double behind) const
     return 0.0;
   }
   const double tip = std::min(1.0, behind / this->tipLength);
+  if (this->IsMicrocatheter())
+  {
+    const double outside = AlongSections(this->sections, behind, OuterRadius);
+    return this->tipRadius + tip * (outside - this->tipRadius);
+  }
   const double back =
     std::clamp((behind - this->tipLength - this->length) / this->shoulder, 0.0, 1.0);
   const double front = this->tipRadius + tip * (this->crossingRadius - this->tipRadius);
@@ -355,6 +428,13 @@ double BalloonCatheter::CrimpedRadius(double behind) const
 
 double BalloonCatheter::Profile() const
 {
+  if (this->IsMicrocatheter())
+  {
+    return std::max_element(this->sections.begin(), this->sections.end(),
+      [](const MicrocatheterSection& a, const MicrocatheterSection& b)
+      { return a.outerRadius < b.outerRadius; })
+      ->outerRadius;
+  }
   const double folded = std::max(this->crossingRadius, this->shaftRadius);
   return this->stent ? std::max(folded, this->stent->crimpedRadius) : folded;
 }
@@ -379,6 +459,11 @@ double BalloonCatheter::BendingStiffness(double behind, double pressure, double 
   if (behind < 0.0)
   {
     return 0.0;
+  }
+  if (this->IsMicrocatheter())
+  {
+    return AlongSections(this->sections, behind,
+      [](const MicrocatheterSection& section) { return section.bendingStiffness; });
   }
   const double shape = this->Shape(behind);
   const double beside = behind < this->Middle() ? this->tipStiffness : this->shaftStiffness;

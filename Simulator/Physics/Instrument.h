@@ -1,6 +1,6 @@
 /**
  * @file Instrument.h
- * @brief Guidewires, guide catheters, balloon catheters and stents as their mechanics.
+ * @brief Guidewires, guide catheters, balloon catheters, stents and microcatheters as their mechanics.
  */
 #ifndef DynamicCoronary_Instrument_h
 #define DynamicCoronary_Instrument_h
@@ -146,7 +146,18 @@ struct StentDesign
   StentRing CrimpedRing() const;
 };
 
-/// A balloon catheter that runs on the wire, from its tip: tip, balloon between two markers, shaft.
+/// A piece of a microcatheter, counted from its tip.
+struct MicrocatheterSection
+{
+  double length = 0.0;           ///< mm, positive
+  double outerRadius = 0.0;      ///< mm, positive
+  double bendingStiffness = 0.0; ///< EI, N mm^2, positive
+};
+
+/**
+ * A catheter that runs on the wire, from its tip: tip, balloon between two markers, shaft. One with sections is a microcatheter: it
+ * has no balloon, one marker, and the wire in its whole length; nothing else of balloons is used.
+ */
 struct BalloonCatheter
 {
   std::string name;
@@ -176,6 +187,17 @@ struct BalloonCatheter
   double inflationResistance = 0.0; ///< atm s/mL of the lumen that fills it
   double fillFraction = 0.5;        ///< of contrast medium in what fills it
 
+  ///@{
+  /// Of a microcatheter, else empty and 0.
+  std::vector<MicrocatheterSection> sections; ///< linear as a wire's; the last one goes on
+  double innerRadius = 0.0;                   ///< mm, of its lumen
+  double markerPlace = 0.0;                   ///< mm behind its tip, of its marker's middle
+  ///@}
+
+  bool IsMicrocatheter() const { return !this->sections.empty(); }
+  /// "balloon" or "microcatheter".
+  const char* Kind() const { return this->IsMicrocatheter() ? "microcatheter" : "balloon"; }
+
   /// @throws std::invalid_argument naming the balloon and the property
   void Validate() const;
 
@@ -193,7 +215,11 @@ struct BalloonCatheter
   BalloonCatheter WithoutStent() const;
   /// EI, N mm^2. @param pressure  atm @param radius  mm of the balloon there
   double BendingStiffness(double behind, double pressure, double radius) const;
-  double Middle() const { return this->tipLength + 0.5 * this->length; } ///< mm behind the tip
+  /// mm behind the tip; of a microcatheter the tip.
+  double Middle() const
+  {
+    return this->IsMicrocatheter() ? 0.0 : this->tipLength + 0.5 * this->length;
+  }
   double Reach() const
   {
     return this->tipLength + this->length + this->shoulder;
@@ -204,6 +230,8 @@ struct BalloonCatheter
 /// @throws std::invalid_argument  naming the instrument and the property; one that does not fit into the catheter
 void RequireFit(const BalloonCatheter& balloon, const GuideCatheter& catheter);
 void RequireFit(const Guidewire& wire, const GuideCatheter& catheter);
+/// A wire in a microcatheter; any wire is in a balloon.
+void RequireFit(const Guidewire& wire, const BalloonCatheter& around);
 /// Side by side.
 void RequireFitBeside(
   const BalloonCatheter& balloon, const Guidewire& wire, const GuideCatheter& catheter);

@@ -95,6 +95,7 @@ struct Intervention::Internals
   double SleeveHand = 0.0;  // as accepted
   std::vector<PlacedStent> Stents;
   double Inflator = 0.0; // atm
+  bool ToldNoBalloon = false;
 
   TickReport Report;
   std::vector<Vector3> Line;
@@ -229,8 +230,9 @@ void Intervention::Internals::BeginFrame()
     for (std::size_t n = 0; n < this->Wires.size() && this->Wires.size() > 1; ++n)
     {
       this->Wires[n]->Trap().BeginFrame(this->Stents,
-        n == this->SleeveWire ? nullptr : this->Sleeve.get(), *this->Opening, this->LastAxis,
-        this->Axis, this->FrameSeconds);
+        n == this->SleeveWire || this->Sleeve->Device().IsMicrocatheter() ? nullptr
+                                                                          : this->Sleeve.get(),
+        *this->Opening, this->LastAxis, this->Axis, this->FrameSeconds);
     }
   }
   std::copy_n(this->Axis.begin() + static_cast<std::ptrdiff_t>(this->RootFirst), this->RootCount,
@@ -329,12 +331,19 @@ void Intervention::Internals::DriveSleeve(const DriveInput& input)
     this->SleeveHand += way;
     this->Inflator = std::clamp(input.inflation, -1.0, 40.0);
   }
+  const bool microcatheter = this->Sleeve->Device().IsMicrocatheter();
+  const bool inflated = microcatheter && this->Inflator > Emptied;
+  if (inflated && !this->ToldNoBalloon)
+  {
+    this->Say(Notice::NoBalloon);
+  }
+  this->ToldNoBalloon = inflated;
   const double share =
     static_cast<double>(this->TickInFrame) / static_cast<double>(this->Room.settings.ticksPerFrame);
   DrivenWire& wire = this->Carrier();
   if (!this->Sleeve->Drive(way, most, wire.Rail(), share, wire.Rod()))
   {
-    this->Say(Notice::BalloonLimit);
+    this->Say(microcatheter ? Notice::MicrocatheterLimit : Notice::BalloonLimit);
   }
 }
 
@@ -342,6 +351,7 @@ void Intervention::Internals::DriveSleeve(const DriveInput& input)
 void Intervention::Internals::RequireFitting(const BalloonCatheter& balloon) const
 {
   RequireFit(balloon, this->Room.catheter);
+  RequireFit(this->Wires[this->InHand]->Device(), balloon);
   if (this->Wires.size() > 1)
   {
     for (const std::unique_ptr<DrivenWire>& wire : this->Wires)
@@ -763,7 +773,8 @@ bool Intervention::Exchange(const BalloonCatheter& balloon)
   data.RequireFitting(balloon);
   if (!data.SleeveIsParked() || data.Sleeve->Report().pressure > Emptied)
   {
-    data.Say(Notice::NotExchanged);
+    data.Say(data.Sleeve->Device().IsMicrocatheter() ? Notice::MicrocatheterNotExchanged
+                                                     : Notice::NotExchanged);
     return false;
   }
   data.Carrier().SetSleeve(nullptr);
@@ -779,12 +790,31 @@ bool Intervention::Exchange(const Guidewire& wire)
 {
   Internals& data = *this->Data;
   RequireFit(wire, data.Room.catheter);
-  if (data.Hand().Beyond() > 0.0)
+  const bool through = data.Sleeve && data.SleeveWire == data.InHand;
+  if (through)
+  {
+    RequireFit(wire, data.Sleeve->Device());
+  }
+  DrivenWire& hand = data.Hand();
+  if (hand.Beyond() <= 0.0)
+  {
+    hand.Take(wire);
+    return true;
+  }
+  if (!through || !data.Sleeve->Device().IsMicrocatheter())
   {
     data.Say(Notice::WireNotExchanged);
     return false;
   }
-  data.Hand().Take(wire);
+  const double out = hand.Fed() - data.Sleeve->Tip();
+  if (out > MostOut)
+  {
+    char text[80];
+    std::snprintf(text, sizeof(text), "%.1f mm; up to %g mm it can be", out, MostOut);
+    data.Room.notices.Say(Notice::WireOutOfMicrocatheter, data.Room.tick, text);
+    return false;
+  }
+  hand.TakeAlong(wire);
   return true;
 }
 

@@ -167,8 +167,11 @@ public:
    */
   bool Exchange(const BalloonCatheter& balloon);
   /// Another wire in place of the one in hand, its tip where this one's was: both turned as the hand is, and at rest.
-  /// @return false: this one is not wholly in the guide; a message says so
+  /// Through a microcatheter it lies as this one did, which keeps its place.
+  /// @return false: this one is neither wholly in the guide nor, but for MostOut, in a microcatheter; a message says so
+  /// @throws as RequireFit
   bool Exchange(const Guidewire& wire);
+  static constexpr double MostOut = 3.0; ///< mm beyond the microcatheter's tip
 
   const Guidewire& Wire(std::size_t number = 0) const;
   /// Tissue that fills vessels, and how far it was crossed.

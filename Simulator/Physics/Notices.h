@@ -26,6 +26,11 @@ enum class Notice : int
   StentInGuide,
   NotExchanged,
   WireNotExchanged,
+  MicrocatheterLimit,
+  WireAtMicrocatheter,
+  NoBalloon,
+  MicrocatheterNotExchanged,
+  WireOutOfMicrocatheter,
   Count
 };
 
@@ -36,7 +41,8 @@ public:
     : TickRate(tickRate)
   {
   }
-  void Say(Notice notice, std::uint64_t tick);
+  /// @param more  what is added to the sentence
+  void Say(Notice notice, std::uint64_t tick, const std::string& more = {});
   /// Since the last call, a sentence each.
   std::vector<std::string> Take();
 

@@ -131,6 +131,24 @@ constexpr DeviceNumber<BalloonCatheter> BalloonNumbers[] = {
   { "contrast_fraction", &BalloonCatheter::fillFraction, 1.0 }
 };
 
+constexpr DeviceNumber<BalloonCatheter> MicrocatheterNumbers[] = {
+  { "length_mm", &BalloonCatheter::monorail, 1.0 },
+  { "inner_diameter_mm", &BalloonCatheter::innerRadius, 0.5 },
+  { "tip_mm", &BalloonCatheter::tipLength, 1.0 },
+  { "tip_diameter_mm", &BalloonCatheter::tipRadius, 0.5 },
+  { "marker_mm", &BalloonCatheter::markerLength, 1.0 },
+  { "marker_at_mm", &BalloonCatheter::markerPlace, 1.0 },
+  { "push_stiffness_N_per_mm", &BalloonCatheter::pushStiffness, 1.0 },
+  { "friction_on_wire_N", &BalloonCatheter::wireFriction, 1.0 },
+  { "friction", &BalloonCatheter::friction, 1.0 }
+};
+
+constexpr DeviceNumber<MicrocatheterSection> MicrocatheterSectionNumbers[] = {
+  { "length_mm", &MicrocatheterSection::length, 1.0 },
+  { "outer_diameter_mm", &MicrocatheterSection::outerRadius, 0.5 },
+  { "bending_stiffness_N_mm2", &MicrocatheterSection::bendingStiffness, 1.0 }
+};
+
 constexpr DeviceNumber<StentDesign> StentNumbers[] = {
   { "diameter_mm", &StentDesign::diameter, 1.0 }, { "length_mm", &StentDesign::length, 1.0 },
   { "crimped_profile_mm", &StentDesign::crimpedRadius, 0.5 },
@@ -173,11 +191,11 @@ void Check(const Instrument& instrument, const std::string& where)
   }
 }
 
+/// @param names  of others that there are, for the message
 template <typename List, typename Name>
 auto& Named(const List& list, const std::string& wanted, const char* what,
-  const std::string& origin, const Name& nameOf)
+  const std::string& origin, const Name& nameOf, std::string names = {})
 {
-  std::string names;
   for (const auto& one : list)
   {
     if (nameOf(one) == wanted)
@@ -280,8 +298,40 @@ CatalogueCatheter CatheterFromJson(const Json& object, const std::string& where)
   return result;
 }
 
+CatalogueBalloon MicrocatheterFromJson(const Json& object, const std::string& where)
+{
+  CatalogueBalloon result;
+  BalloonCatheter& device = result.balloon;
+  JsonFields fields(object, where + ": microcatheter" + QuotedName(object));
+  device.name = fields.Text("name");
+  device.source = fields.Text("source", "");
+  result.description = fields.Text("description", "");
+  ReadNumbers(fields, MicrocatheterNumbers, device);
+  for (const Json& entry : fields.List("sections"))
+  {
+    JsonFields piece(
+      entry, fields.Where() + ", section " + std::to_string(device.sections.size() + 1));
+    ReadNumbers(piece, MicrocatheterSectionNumbers, device.sections.emplace_back());
+    piece.Text("name", "");
+    result.moduli.push_back(piece.Number("modulus_MPa", 0.0, 1e6, 0.0));
+    piece.Done();
+  }
+  if (device.sections.empty())
+  {
+    fields.Refuse("has no sections");
+  }
+  result.sources = SourcesOf(fields);
+  fields.Done();
+  Check(device, where);
+  return result;
+}
+
 CatalogueBalloon BalloonFromJson(const Json& object, const std::string& where)
 {
+  if (object.is_object() && object.contains("sections"))
+  {
+    return MicrocatheterFromJson(object, where);
+  }
   CatalogueBalloon result;
   BalloonCatheter& balloon = result.balloon;
   JsonFields fields(object, where + ": balloon" + QuotedName(object));
@@ -316,6 +366,15 @@ CatalogueBalloon BalloonFromJson(const Json& object, const std::string& where)
 Json BalloonToJson(const BalloonCatheter& balloon)
 {
   Json json = { { "name", balloon.name }, { "source", balloon.source } };
+  if (balloon.IsMicrocatheter())
+  {
+    WriteNumbers(balloon, MicrocatheterNumbers, json);
+    for (const MicrocatheterSection& section : balloon.sections)
+    {
+      WriteNumbers(section, MicrocatheterSectionNumbers, json["sections"].emplace_back());
+    }
+    return json;
+  }
   WriteNumbers(balloon, BalloonNumbers, json);
   json["compliance"] = Json::array();
   for (const ComplianceRow& row : balloon.compliance)
@@ -385,8 +444,17 @@ const CatalogueCatheter& InstrumentCatalogue::Catheter(const std::string& name) 
 
 const CatalogueBalloon& InstrumentCatalogue::Balloon(const std::string& name) const
 {
-  return Named(this->balloons, name, "balloon", this->origin,
-    [](const CatalogueBalloon& one) { return one.balloon.name; });
+  const auto nameOf = [](const CatalogueBalloon& one) { return one.balloon.name; };
+  std::string names;
+  for (const CatalogueBalloon& one : this->microcatheters)
+  {
+    if (nameOf(one) == name)
+    {
+      return one;
+    }
+    names += (names.empty() ? "" : ", ") + nameOf(one);
+  }
+  return Named(this->balloons, name, "balloon", this->origin, nameOf, names);
 }
 
 InstrumentCatalogue CatalogueFromText(const std::string& text, const std::string& origin)
@@ -421,6 +489,16 @@ InstrumentCatalogue CatalogueFromText(const std::string& text, const std::string
   {
     catalogue.balloons.push_back(BalloonFromJson(entry, origin));
     isNew(catalogue.balloons.back().balloon.name);
+    if (catalogue.balloons.back().balloon.IsMicrocatheter())
+    {
+      fields.Refuse("has '" + catalogue.balloons.back().balloon.name +
+        "', which has sections, among its 'balloons': it belongs to 'microcatheters'");
+    }
+  }
+  for (const Json& entry : fields.Has("microcatheters") ? fields.List("microcatheters") : none)
+  {
+    catalogue.microcatheters.push_back(MicrocatheterFromJson(entry, origin));
+    isNew(catalogue.microcatheters.back().balloon.name);
   }
   fields.Done();
   return catalogue;

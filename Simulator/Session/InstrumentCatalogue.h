@@ -1,6 +1,6 @@
 /**
  * @file InstrumentCatalogue.h
- * @brief Guidewires, guide catheters, balloons and stents by name, read from JSON. docs/simulator-files.md has the format.
+ * @brief Guidewires, guide catheters, balloons, stents and microcatheters by name, read from JSON. docs/simulator-files.md has the format.
  */
 #ifndef DynamicCoronary_InstrumentCatalogue_h
 #define DynamicCoronary_InstrumentCatalogue_h
@@ -49,6 +49,7 @@ struct CatalogueBalloon
 {
   BalloonCatheter balloon;
   std::string description;
+  std::vector<double> moduli; ///< MPa, a microcatheter's section each, as a catheter's
   ValueSources sources;
 };
 
@@ -58,12 +59,13 @@ struct InstrumentCatalogue
   std::vector<CatalogueWire> wires;
   std::vector<CatalogueCatheter> catheters;
   std::vector<CatalogueBalloon> balloons;
+  std::vector<CatalogueBalloon> microcatheters;
 
   ///@{
   /// @throws std::invalid_argument naming the catalogue, the name and the names that there are
   const CatalogueWire& Wire(const std::string& name) const;
   const CatalogueCatheter& Catheter(const std::string& name) const;
-  const CatalogueBalloon& Balloon(const std::string& name) const;
+  const CatalogueBalloon& Balloon(const std::string& name) const; ///< or microcatheter
   ///@}
 };
 

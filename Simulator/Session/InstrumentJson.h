@@ -17,10 +17,12 @@ namespace coronary
 /**
  * @param where  for messages, in front of the instrument's name: "'file.json'"
  * @throws std::invalid_argument naming instrument, section and property
+ * An object with sections is a microcatheter to BalloonFromJson, too.
  */
 CatalogueWire WireFromJson(const nlohmann::json& object, const std::string& where);
 CatalogueCatheter CatheterFromJson(const nlohmann::json& object, const std::string& where);
 CatalogueBalloon BalloonFromJson(const nlohmann::json& object, const std::string& where);
+CatalogueBalloon MicrocatheterFromJson(const nlohmann::json& object, const std::string& where);
 ///@}
 
 ///@{

@@ -21,15 +21,15 @@ constexpr double IschaemiaFree = 60.0; // s
 
 bool IsOfLesion(Goal goal)
 {
-  return goal == Goal::WireAtLesion || goal == Goal::WireBeyondLesion ||
-    goal == Goal::BalloonInLesion || goal == Goal::StentInLesion || goal == Goal::StenosisBelow ||
-    goal == Goal::ReserveAbove;
+  return goal == Goal::WireAtLesion || goal == Goal::MicrocatheterAtLesion ||
+    goal == Goal::WireBeyondLesion || goal == Goal::BalloonInLesion ||
+    goal == Goal::StentInLesion || goal == Goal::StenosisBelow || goal == Goal::ReserveAbove;
 }
 
 bool NeedsBalloon(Goal goal)
 {
   return goal == Goal::BalloonInLesion || goal == Goal::StentInLesion ||
-    goal == Goal::SideBranchOpen;
+    goal == Goal::SideBranchOpen || goal == Goal::MicrocatheterAtLesion;
 }
 
 /// The step's lesion among the session's.
@@ -184,8 +184,16 @@ bool ProcedureWatch::Reached(const ProcedureMoment& moment,
     case Goal::WireAtLesion:
       return this->IsBehind(lesion->branch, report.branch) &&
         report.catheterTip + report.inserted >= lesion->from - step.value;
+    case Goal::MicrocatheterAtLesion:
+      // The wire's tip says which way it is on.
+      return report.balloon.microcatheter && report.balloon.place >= 0 &&
+        (this->IsBehind(lesion->branch, report.branch) ||
+          this->IsBehind(report.branch, lesion->branch)) &&
+        report.balloon.middle >= lesion->from - step.value;
     case Goal::WireTaken:
       return static_cast<double>(moment.wire) == step.value;
+    case Goal::BalloonTaken:
+      return static_cast<double>(moment.balloon) == step.value;
     case Goal::WireBeyondLesion:
       return this->IsBehind(report.branch, lesion->branch) &&
         report.catheterTip + report.inserted - lesion->to >= step.value;
@@ -255,7 +263,7 @@ ProcedureScore ScoreOf(const std::vector<ProcedureStep>& steps, const ProcedureS
   {
     score.failures.push_back("not done: " + steps[n].text);
   }
-  if (last.balloon.wallPressure > 0.0)
+  if (last.balloon.wallPressure > 0.0 && !last.balloon.microcatheter)
   {
     score.failures.emplace_back("a balloon is left open in the vessel");
   }

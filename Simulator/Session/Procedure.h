@@ -36,6 +36,7 @@ struct ProcedureMoment
   std::int64_t run = 0;                           ///< cine runs that were begun
   double injected = 0.0;                          ///< mL
   std::size_t wire = 0;                           ///< number of the wire in use, as WireOf
+  std::size_t balloon = 0;                        ///< likewise, as BalloonOf
   const std::vector<VesselTear>* tears = nullptr; ///< of walls; null: none
 };
 

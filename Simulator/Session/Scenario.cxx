@@ -39,6 +39,8 @@ constexpr GoalName GoalNames[] = { { ProcedureStep::Goal::Angiogram, "angiogram"
   { ProcedureStep::Goal::WireAtLesion, "wire_at_lesion", "mm", 0.0, 50.0 },
   { ProcedureStep::Goal::WireBeyondLesion, "wire_beyond_lesion", "mm", 0.0, 200.0 },
   { ProcedureStep::Goal::WireTaken, "wire_taken", "number", 0.0, 100.0 },
+  { ProcedureStep::Goal::BalloonTaken, "balloon_taken", "number", 0.0, 100.0 },
+  { ProcedureStep::Goal::MicrocatheterAtLesion, "microcatheter_at_lesion", "mm", 0.0, 50.0 },
   { ProcedureStep::Goal::BalloonInLesion, "balloon_in_lesion", "atm", 0.5, 40.0 },
   { ProcedureStep::Goal::StentInLesion, "stent_in_lesion", nullptr, 0.0, 0.0 },
   { ProcedureStep::Goal::StenosisBelow, "stenosis_below", "percent", 1.0, 100.0 },
@@ -564,6 +566,7 @@ ProcedureStep StepOf(const Json& object, const std::string& where)
     ? fields.Text("vessel")
     : step.goal == ProcedureStep::Goal::Angiogram || step.goal == ProcedureStep::Goal::WireBack ||
       step.goal == ProcedureStep::Goal::GuideIn || step.goal == ProcedureStep::Goal::WireTaken ||
+      step.goal == ProcedureStep::Goal::BalloonTaken ||
       step.goal == ProcedureStep::Goal::LeakStopped || step.goal == ProcedureStep::Goal::LeakSealed
     ? ""
     : fields.Text("vessel", "");
@@ -724,6 +727,11 @@ Scenario ScenarioFromText(
     if (taken && !WireOf(scenario, static_cast<std::size_t>(step.value)))
     {
       fields.Refuse("has a step '" + step.text + "' that takes a wire that it has not");
+    }
+    const bool changed = step.goal == ProcedureStep::Goal::BalloonTaken;
+    if (changed && !BalloonOf(scenario, static_cast<std::size_t>(step.value)))
+    {
+      fields.Refuse("has a step '" + step.text + "' that takes a balloon that it has not");
     }
     if (step.wire > 0 && !scenario.secondWire)
     {

@@ -57,16 +57,18 @@ struct ProcedureStep
     GuideIn,      ///< the guide catheter's tip is in the ostium
     WireIn,       ///< the wire's tip is in `vessel`, or behind it
     WireAtLesion, ///< value: mm before the lesion's beginning, at most, on the way to it
-    WireBeyondLesion, ///< value: mm of wire behind the lesion
-    WireTaken,        ///< value: number of the wire, as WireOf
-    BalloonInLesion,  ///< value: atm of a balloon whose middle is in the lesion
-    StentInLesion,    ///< a stent is in it
-    StenosisBelow,    ///< value: per cent of the diameter, without an open balloon
-    ReserveAbove,     ///< value: FFR, likewise
-    WireBack,         ///< wires and balloon are in the guide, or `wire` is
-    SideBranchOpen,   ///< value: FFR in the side branch `vessel`, without an open balloon
-    LeakStopped,      ///< a wall is perforated, and nothing comes out
-    LeakSealed        ///< likewise, and all holes have closed
+    WireBeyondLesion,      ///< value: mm of wire behind the lesion
+    WireTaken,             ///< value: number of the wire, as WireOf
+    BalloonTaken,          ///< value: number of the balloon or microcatheter, as BalloonOf
+    MicrocatheterAtLesion, ///< value: as WireAtLesion, of a microcatheter's tip
+    BalloonInLesion,       ///< value: atm of a balloon whose middle is in the lesion
+    StentInLesion,         ///< a stent is in it
+    StenosisBelow,         ///< value: per cent of the diameter, without an open balloon
+    ReserveAbove,          ///< value: FFR, likewise
+    WireBack,              ///< wires and balloon are in the guide, or `wire` is
+    SideBranchOpen,        ///< value: FFR in the side branch `vessel`, without an open balloon
+    LeakStopped,           ///< a wall is perforated, and nothing comes out
+    LeakSealed             ///< likewise, and all holes have closed
   };
   Goal goal = Goal::Angiogram;
   std::string text;   ///< what to do, for people
@@ -88,7 +90,7 @@ struct Scenario
   std::vector<Guidewire> wireExchanges; ///< for it, in their order
   std::optional<Guidewire> secondWire;  ///< in the same guide
   GuideCatheter catheter;
-  std::optional<BalloonCatheter> balloon; ///< none: the session has none
+  std::optional<BalloonCatheter> balloon; ///< or microcatheter; none: the session has none
   std::vector<BalloonCatheter> exchanges; ///< for it, in their order; none without a balloon
   std::vector<VesselLesion> lesions;      ///< set into the vessels
   std::vector<Incident> incidents;        ///< what goes wrong

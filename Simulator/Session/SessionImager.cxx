@@ -24,10 +24,11 @@ constexpr double BraidShare =
   0.12; // of a guide catheter's wall that is steel: 16 flat wires of 25 x 75 um or so
 constexpr double InnerTube =
   0.28; // mm: outer radius of the wire's lumen in a balloon, that its markers are on
-constexpr double MarkerThickness = 0.04; // mm of platinum
-constexpr double BlushSigma = 7.0;       // mm of the myocardium behind an outlet
-constexpr double FaintestBlush = 1e-5;   // mL
-constexpr double CoarseThorax = 4.0;     // mm between the voxels that the exposure control sees
+constexpr double MarkerThickness = 0.04;    // mm of platinum
+constexpr double TipMarkerThickness = 0.06; // mm, likewise of a microcatheter: seen beside a coil
+constexpr double BlushSigma = 7.0;          // mm of the myocardium behind an outlet
+constexpr double FaintestBlush = 1e-5;      // mL
+constexpr double CoarseThorax = 4.0;        // mm between the voxels that the exposure control sees
 constexpr std::size_t MemoryOfPart = 32U << 20U; // bytes of shadows that are kept
 
 /// Where a branch leaves its parent: number of the nearest point of the parent's axis.
@@ -438,6 +439,11 @@ void SessionImager::ProjectGuideLumen(const SessionSnapshot& snapshot, const CAr
 void SessionImager::ProjectBalloon(const SessionSnapshot& snapshot, const CArmGeometry& geometry)
 {
   const BalloonCatheter& balloon = *BalloonOf(this->Scenario_, snapshot.balloonNumber);
+  if (balloon.IsMicrocatheter())
+  {
+    this->ProjectMicrocatheter(balloon, snapshot.balloon, geometry);
+    return;
+  }
   const bool crimped = snapshot.report.balloon.crimped;
   const double polymer = this->Materials.Of(XRayMaterial::Nylon);
   const double platinum = this->Materials.Of(XRayMaterial::Platinum);
@@ -464,6 +470,30 @@ void SessionImager::ProjectBalloon(const SessionSnapshot& snapshot, const CArmGe
   AddInstrument(shaft, geometry, this->InstrumentLayer);
   AddInstrument(markers, geometry, this->InstrumentLayer);
   AddContrast({ fill }, this->NeatContrast, geometry, this->InstrumentLayer);
+}
+
+/// A braided tube, and a band at its tip.
+void SessionImager::ProjectMicrocatheter(
+  const BalloonCatheter& device, const std::vector<Vector3>& line, const CArmGeometry& geometry)
+{
+  const double wall = (1.0 - BraidShare) * this->Materials.Of(XRayMaterial::Nylon) +
+    BraidShare * this->Materials.Of(XRayMaterial::StainlessSteel);
+  const double platinum = this->Materials.Of(XRayMaterial::Platinum);
+  InstrumentChain shaft{ line, {} };
+  InstrumentChain marker = shaft;
+  double behind = 0.0;
+  for (std::size_t n = 0; n + 1 < line.size(); ++n)
+  {
+    const double length = (line[n + 1] - line[n]).norm();
+    const double middle = behind + 0.5 * length;
+    shaft.segments.push_back({ device.FoldedRadius(middle), device.innerRadius, wall });
+    const bool marked = std::abs(middle - device.markerPlace) <= 0.5 * device.markerLength;
+    marker.segments.push_back(
+      { device.innerRadius + TipMarkerThickness, device.innerRadius, marked ? platinum : 0.0 });
+    behind += length;
+  }
+  AddInstrument(shaft, geometry, this->InstrumentLayer);
+  AddInstrument(marker, geometry, this->InstrumentLayer);
 }
 
 /// Struts are thinner than a pixel: a tube of as much metal.
@@ -499,6 +529,10 @@ std::vector<Vector3> BalloonMarkers(const SessionSnapshot& snapshot, const Scena
     return markers;
   }
   const BalloonCatheter& balloon = *BalloonOf(scenario, snapshot.balloonNumber);
+  if (balloon.IsMicrocatheter())
+  {
+    return markers;
+  }
   for (const double place : { balloon.tipLength, balloon.tipLength + balloon.length })
   {
     double behind = 0.0;

@@ -64,7 +64,8 @@ std::shared_ptr<const VolumeProjector> MeasuredThorax(
 /// The heart and all that is in its vessels moves with the breath as a whole: as if the C-arm moved the other way.
 CArmGeometry GeometryOfHeart(const SessionSnapshot& snapshot, const DetectorFormat& format);
 
-/// The middles of the balloon's markers, from its tip on, mm: two, or fewer where the rest lies in the guide catheter.
+/// The middles of the balloon's markers, from its tip on, mm: two, or fewer where the rest lies in the guide catheter; a
+/// microcatheter has none.
 std::vector<Vector3> BalloonMarkers(const SessionSnapshot& snapshot, const Scenario& scenario);
 
 /**
@@ -114,6 +115,8 @@ private:
     const SessionSnapshot& snapshot, const std::vector<Vector3>& line, std::size_t number) const;
   void ProjectGuideLumen(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   void ProjectBalloon(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
+  void ProjectMicrocatheter(
+    const BalloonCatheter& device, const std::vector<Vector3>& line, const CArmGeometry& geometry);
   void ProjectStents(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   void ProjectContrast(const SessionSnapshot& snapshot, const CArmGeometry& geometry);
   void MoveBackground(const SessionSnapshot& snapshot, const CArmGeometry& geometry);

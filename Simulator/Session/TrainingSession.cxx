@@ -41,6 +41,16 @@ GuidePlace PlaceOf(const GuideSeat& seat)
   return seat.Deep() ? GuidePlace::Deep : seat.engaged ? GuidePlace::Ostium : GuidePlace::Aorta;
 }
 
+const char* KindOf(const Guidewire&)
+{
+  return "wire";
+}
+
+const char* KindOf(const BalloonCatheter& balloon)
+{
+  return balloon.Kind();
+}
+
 double Limited(double value, double low, double high, double otherwise)
 {
   return std::isfinite(value) ? std::clamp(value, low, high) : otherwise;
@@ -125,9 +135,13 @@ struct TrainingSession::Internals
     {
       RequireFit(*one, scenario.catheter);
       this->Wires.push_back(*one);
-      for (std::size_t k = 0; k < this->Balloons.size() && scenario.secondWire; ++k)
+      for (const BalloonCatheter& balloon : this->Balloons)
       {
-        RequireFitBeside(this->Balloons[k], *one, scenario.catheter);
+        RequireFit(*one, balloon);
+        if (scenario.secondWire)
+        {
+          RequireFitBeside(balloon, *one, scenario.catheter);
+        }
       }
     }
     this->WireNumbers = { 0, scenario.secondWire ? this->Wires.size() - 1 : 0 };
@@ -676,10 +690,10 @@ void TrainingSession::Internals::MeasureHands(const SessionInput& input)
 void TrainingSession::Internals::StepProcedure()
 {
   const bool lesions = this->Procedure->NeedsLesions();
-  this->Procedure->Step(
-    { this->Report.tick, this->Metrics, this->Pose,
-      this->Clock.Radiating() && this->Clock.Last().cine, this->Clock.Runs(),
-      this->Medium.Tracers().Injected(), this->WireNumbers[this->InHand], &this->Tears.All() },
+  this->Procedure->Step({ this->Report.tick, this->Metrics, this->Pose,
+                          this->Clock.Radiating() && this->Clock.Last().cine, this->Clock.Runs(),
+                          this->Medium.Tracers().Injected(), this->WireNumbers[this->InHand],
+                          this->BalloonNumber, &this->Tears.All() },
     lesions ? this->Watch.Results(this->Physics, this->Medium) : std::vector<LesionResult>(),
     lesions ? this->Watch.Stents(this->Physics) : std::vector<StentResult>(), this->Messages,
     lesions ? this->Watch.Mouths(this->Physics, this->Medium) : std::vector<MouthResult>());
@@ -704,7 +718,8 @@ bool TrainingSession::Internals::Exchange(
   if (this->Physics.Exchange(list[wanted]))
   {
     inUse = wanted;
-    this->Messages.push_back(std::string("The ") + what + " '" + list[wanted].name + "' is taken.");
+    this->Messages.push_back(
+      std::string("The ") + KindOf(list[wanted]) + " '" + list[wanted].name + "' is taken.");
   }
   return true;
 }

@@ -52,7 +52,13 @@ QString TextOfBalloon(const SessionSnapshot& moment, bool hasBalloon)
 {
   const BalloonReport& balloon = moment.report.balloon;
   QString text;
-  if (hasBalloon)
+  if (hasBalloon && balloon.microcatheter)
+  {
+    text += QString("\nMicrocatheter  %1 mm out, hand %2 N\nWire  %3 mm beyond it")
+              .arg(Decimal(balloon.tip, 1), Decimal(balloon.force, 2),
+                Decimal(moment.report.inserted - balloon.tip, 1));
+  }
+  else if (hasBalloon)
   {
     text += QString("\nBalloon  %1 mm out, %2 atm\n%3 to %4 mm wide, hand %5 N")
               .arg(Decimal(balloon.tip, 1), Decimal(balloon.pressure, 1), Decimal(balloon.least, 2),
@@ -106,6 +112,10 @@ InstrumentPanel::InstrumentPanel()
   {
     this->Balloon->addItem(QString::fromStdString(one.balloon.name));
   }
+  for (const CatalogueBalloon& one : BuiltInCatalogue().microcatheters)
+  {
+    this->Balloon->addItem(QString::fromStdString(one.balloon.name));
+  }
   for (QComboBox* box : { this->Wire, this->Catheter, this->Balloon })
   {
     box->setToolTip("Taken at the next new session");
@@ -123,9 +133,10 @@ InstrumentPanel::InstrumentPanel()
   form->addRow(this->NextWire.button);
   form->addRow(this->NextBalloon.button);
   form->addRow(this->Text);
-  this->NextWire.button->setToolTip("Once the wire is drawn back into the guide catheter");
+  this->NextWire.button->setToolTip(
+    "Once the wire is drawn back into the guide catheter, or to a microcatheter's tip");
   this->NextBalloon.button->setToolTip(
-    "Once the balloon is empty and wholly in the guide catheter");
+    "Once the balloon or microcatheter is wholly in the guide catheter, and empty");
   const auto exchanges = [this](const NextButton& next, RecordedEvent::Kind kind)
   {
     QObject::connect(next.button, &QPushButton::clicked,

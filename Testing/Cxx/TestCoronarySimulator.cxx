@@ -643,13 +643,14 @@ TEST_F(TestCoronarySimulator, PrintsWhatItKnows)
 {
   ASSERT_EQ(this->Run("--list-scenarios"), 0);
   for (const char* name : { "phantom-lca", "phantom-rca", "hra-lca", "angiogram-lca", "cto-lad",
-         "engage-lca", "lad-bifurcation", "lad-lesion", "lad-perforation", "lad-stent",
-         "lca-events", "patient-lca", "patient-rca" })
+         "cto-microcatheter", "engage-lca", "lad-bifurcation", "lad-lesion", "lad-perforation",
+         "lad-stent", "lca-events", "patient-lca", "patient-rca" })
   {
     EXPECT_NE(ReadText(this->Folder / "stdout").find(name), std::string::npos);
   }
   ASSERT_EQ(this->Run("--list-instruments"), 0);
   EXPECT_NE(ReadText(this->Folder / "stdout").find("cto-9gf"), std::string::npos);
+  EXPECT_NE(ReadText(this->Folder / "stdout").find("microcatheter-1.8F"), std::string::npos);
   ASSERT_EQ(this->Run("--scenario phantom-lca --heart-rate 99 --wire cto-9gf --print-scenario"), 0);
   const json scenario = json::parse(ReadText(this->Folder / "stdout"));
   EXPECT_EQ(scenario["settings"]["heart_rate_bpm"], 99.0);

@@ -53,7 +53,7 @@ struct Played
   {
     this->Metrics.procedureSeconds += 1.0;
     this->Watch.Step({ this->Report, this->Metrics, this->Pose, this->Cine, this->Run,
-                       this->Injected, this->Wire },
+                       this->Injected, this->Wire, this->Balloon },
       this->Lesions, this->Stents, this->Said);
     return this->Watch.State().reached.size();
   }
@@ -67,6 +67,7 @@ struct Played
   std::int64_t Run = 0;
   double Injected = 0.0;
   std::size_t Wire = 0;
+  std::size_t Balloon = 0;
   std::vector<std::string> Said;
   ProcedureWatch Watch;
 };
@@ -154,6 +155,31 @@ TEST(Procedure, WiresAtALesion)
   EXPECT_EQ(played.Go(), 1U);
   played.Wire = 1;
   EXPECT_EQ(played.Go(), 2U);
+}
+
+TEST(Procedure, AMicrocatheterAtALesion)
+{
+  Played played({ Step(Goal::MicrocatheterAtLesion, 3.0), Step(Goal::BalloonTaken, 1.0) });
+  TickReport& report = played.Report;
+  report.branch = 0;
+  report.balloon.place = 7;
+  report.balloon.middle = 17.5;
+  EXPECT_EQ(played.Go(), 0U) << "it is a balloon";
+  report.balloon.microcatheter = true;
+  report.branch = 3;
+  EXPECT_EQ(played.Go(), 0U) << "on a wire in another branch";
+  report.branch = 2; // the wire is beyond
+  report.balloon.middle = 16.5;
+  EXPECT_EQ(played.Go(), 0U);
+  report.balloon.middle = 17.5;
+  EXPECT_EQ(played.Go(), 1U);
+  played.Wire = 1;
+  EXPECT_EQ(played.Go(), 1U);
+  played.Balloon = 1;
+  EXPECT_EQ(played.Go(), 2U);
+  ExpectRefusal([&]
+    { ProcedureWatch({ Step(Goal::MicrocatheterAtLesion, 3.0) }, Tree(), played.Lesions, false); },
+    "needs a balloon");
 }
 
 TEST(Procedure, VesselsAndStents)

@@ -70,7 +70,7 @@ public:
 TEST(UnitTestScenario, BuiltInOnesAreGood)
 {
   const auto list = coronary::BuiltInScenarios();
-  ASSERT_EQ(list.size(), 13U);
+  ASSERT_EQ(list.size(), 14U);
   for (const auto& one : list)
   {
     const Scenario scenario = LoadScenario(one.name);
@@ -105,6 +105,10 @@ TEST(UnitTestScenario, BuiltInOnesAreGood)
   EXPECT_EQ(coronary::WireOf(occluded, 2), nullptr);
   ASSERT_EQ(occluded.lesions.size(), 1U);
   EXPECT_EQ(occluded.lesions[0].degree, 1.0);
+  const Scenario through = LoadScenario("cto-microcatheter");
+  ASSERT_TRUE(through.balloon);
+  EXPECT_TRUE(through.balloon->IsMicrocatheter());
+  EXPECT_FALSE(coronary::BalloonOf(through, 1)->IsMicrocatheter());
   const Scenario forked = LoadScenario("lad-bifurcation");
   ASSERT_TRUE(forked.secondWire);
   EXPECT_NO_THROW(forked.secondWire->Validate());
@@ -192,6 +196,11 @@ TEST(UnitTestScenario, StepsOfAProcedure)
       with({ { "text", "go" }, { "goal", "wire_taken" }, { "number", 1 } });
     },
     "'file' has a step 'go' that takes a wire that it has not");
+  ExpectRefusal(
+    [&] {
+      with({ { "text", "go" }, { "goal", "balloon_taken" }, { "number", 9 } });
+    },
+    "'file' has a step 'go' that takes a balloon that it has not");
   ExpectRefusal([&] { with({ { "goal", "wire_back" } }); }, "'text'");
   ExpectRefusal([&] { with({ { "text", "go" }, { "goal", "wire_back" }, { "mm", 3 } }); }, "'mm'");
 }
