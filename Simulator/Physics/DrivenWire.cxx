@@ -15,6 +15,7 @@ constexpr double SoftTip = 3.0;   // mm of the catheter
 constexpr double LossTime = 2e-3; // s
 constexpr double SpinDrag = 1e-6; // N s
 constexpr int MinimumSegments = 4;
+constexpr double HeadOn = 0.8; // cosine between the tip's axis and a wall's normal
 
 /// How much harder a vessel is than its stiffness against the bare wire: what begins a tick deep inside the wall, as a tip that
 /// a hand jams into the end of a thin vessel, must not come through with its middle. Usual contacts are a tenth as deep.
@@ -537,8 +538,9 @@ void DrivenWire::Measure(TickReport& report) const
       report.tipForce += force;
       if (contact.segment == 0)
       {
-        // What is in front of it pushes it back.
-        report.tipThrust += contact.force * std::max(0.0, contact.normal.dot(this->Rod_.Axis(0)));
+        // What is in front of it pushes it back; along what is oblique it slides.
+        const double along = contact.normal.dot(this->Rod_.Axis(0));
+        report.tipThrust += along > HeadOn ? contact.force * along : 0.0;
       }
     }
   }

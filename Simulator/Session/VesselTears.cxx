@@ -15,21 +15,22 @@ namespace coronary
 namespace
 {
 constexpr double PascalPerMmHg = 133.322387415;
-constexpr double LeastOpen = 0.5;    // atm: a balloon with less is not open
-constexpr double OneTear = 5.0;      // mm of a vessel in which a balloon makes one
-constexpr double OneHole = 3.0;      // mm, likewise of a wire's tip
-constexpr double FlapEnd = 3.0;      // mm over which a flap ends
-constexpr double LeastFlap = 0.2;    // of the diameter, where a wall just tears
-constexpr double FlapGrowth = 3.0;   // for each part of stretch beyond
-constexpr double GreatestFlap = 0.7; // as the narrowest that is still called open
-constexpr double FlapGivesWay = 0.1; // mm about what lies in the lumen
-constexpr double LeastHole = 0.5;    // mm, of a wall that just bursts
-constexpr double HoleGrowth = 20.0;  // mm for each part of stretch beyond
-constexpr double GreatestHole = 2.5; // mm
-constexpr double LeastLeak = 0.1;    // mL that are seen
-constexpr double SpreadTime = 60.0;  // s in which medium goes from beside the vessel into the sac
-constexpr double Pocket = 0.6;       // mm of half the wall's circle that a dissection fills
-constexpr double StainTime = 1.5;    // s in which neat medium fills it
+constexpr double LeastOpen = 0.5;     // atm: a balloon with less is not open
+constexpr double OneTear = 5.0;       // mm of a vessel in which a balloon makes one
+constexpr double OneHole = 3.0;       // mm, likewise of a wire's tip
+constexpr double WithoutPlaque = 0.9; // of the reference: less is narrowed
+constexpr double FlapEnd = 3.0;       // mm over which a flap ends
+constexpr double LeastFlap = 0.2;     // of the diameter, where a wall just tears
+constexpr double FlapGrowth = 3.0;    // for each part of stretch beyond
+constexpr double GreatestFlap = 0.7;  // as the narrowest that is still called open
+constexpr double FlapGivesWay = 0.1;  // mm about what lies in the lumen
+constexpr double LeastHole = 0.5;     // mm, of a wall that just bursts
+constexpr double HoleGrowth = 20.0;   // mm for each part of stretch beyond
+constexpr double GreatestHole = 2.5;  // mm
+constexpr double LeastLeak = 0.1;     // mL that are seen
+constexpr double SpreadTime = 60.0;   // s in which medium goes from beside the vessel into the sac
+constexpr double Pocket = 0.6;        // mm of half the wall's circle that a dissection fills
+constexpr double StainTime = 1.5;     // s in which neat medium fills it
 constexpr double SacPressure = 9.0 / 14.0; // mmHg, p1
 constexpr double SacVolume = 57.65;        // mL, V1
 constexpr double HalfStroke = 8.0;         // mmHg, at which half of the stroke volume is left
@@ -138,6 +139,15 @@ double VesselTears::Along(std::int64_t point) const
 {
   const FlowBranch& branch = this->Network.Branches()[this->BranchOf(point)];
   return branch.abscissa[point - branch.firstPoint];
+}
+
+bool VesselTears::HasPlaque(std::int64_t point) const
+{
+  const WallTopology& topology = this->Network.Topology();
+  const int branch = this->BranchOf(point);
+  const std::int64_t k = point - this->Network.Branches()[branch].firstPoint;
+  return !topology.axisReference.empty() &&
+    topology.axisRadius[branch][k] < WithoutPlaque * topology.axisReference[branch][k];
 }
 
 VesselTear VesselTears::At(std::int64_t point, VesselTear::Kind kind) const
@@ -283,7 +293,7 @@ void VesselTears::Puncture(const Intervention& instruments, WallMotion& wall, Co
     point = away < nearest ? candidate : point;
     nearest = std::min(nearest, away);
   }
-  if (!this->Near(point, VesselTear::Kind::Perforation, OneHole))
+  if (!this->HasPlaque(point) && !this->Near(point, VesselTear::Kind::Perforation, OneHole))
   {
     VesselTear tear = this->At(point, VesselTear::Kind::Perforation);
     tear.diameter = 2.0 * instruments.Wire(report.hand).sections.front().radius;

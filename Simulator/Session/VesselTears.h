@@ -149,6 +149,8 @@ private:
   VesselTear At(std::int64_t point, VesselTear::Kind kind) const;
   VesselTear* Near(std::int64_t point, VesselTear::Kind kind, double reach);
   int BranchOf(std::int64_t point) const;
+  /// It lies between the lumen and the wall: a wire's tip does not come to the wall.
+  bool HasPlaque(std::int64_t point) const;
   double Along(std::int64_t point) const; ///< mm from its branch's beginning
 
   WallStrength Strength;

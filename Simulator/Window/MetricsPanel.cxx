@@ -6,12 +6,19 @@
 
 namespace coronary
 {
+namespace
+{
+constexpr int Margin = 5;    // pixels
+constexpr int MostLines = 8; // a step of two lines, and five or six of numbers
+}
+
 MetricsPanel::MetricsPanel()
 {
   this->setTextFormat(Qt::PlainText);
   this->setWordWrap(true);
   this->setFixedWidth(400);
-  this->setMargin(8);
+  this->setMargin(Margin);
+  this->setMinimumHeight(MostLines * this->fontMetrics().lineSpacing() + 2 * Margin);
   this->setStyleSheet("background: rgb(8, 10, 12); color: rgb(225, 232, 235);");
   this->setToolTip("What distinguishes trainees");
 }

@@ -618,5 +618,6 @@ TEST(MicrocatheterProcedure, TheRecordedOneRepeatsToTheBit)
   EXPECT_GT(lesions[0].reserve, 0.9);
   EXPECT_EQ(runner.Session().Procedure().reached.size(), 10U);
   EXPECT_TRUE(runner.Session().Score().passed);
+  EXPECT_TRUE(runner.Session().Tears().empty()) << "the tip pressed on plaque, or obliquely";
 }
 }

@@ -395,6 +395,7 @@ TEST(OcclusionProcedure, TheRecordedOneRepeatsToTheBit)
   EXPECT_GT(lesions[0].reserve, 0.9);
   EXPECT_EQ(runner.Session().Procedure().reached.size(), 8U);
   EXPECT_TRUE(runner.Session().Score().passed);
+  EXPECT_TRUE(runner.Session().Tears().empty()) << "the tip pressed on plaque, or obliquely";
   EXPECT_EQ(runner.Session().Metrics().greatestStShift, 0.0) << "its heart lived without it";
 }
 }
