@@ -121,6 +121,24 @@ TEST(Balloon, TheLawAloneIsExact)
   EXPECT_EQ(WallPressure(healthy, 1.4, law), 0.0);
 }
 
+// Laplace: the hoop stress p R / h of a thin tube over its modulus is the stretch: p = (E h / R) (D / D0 - 1). E h / R of a normal LAD is
+// 0.16 MPa (Int J Cardiol 1986;13:27).
+TEST(Balloon, AHealthyVesselIsAThinElasticTube)
+{
+  constexpr double atmosphere = 0.101325; // MPa
+  constexpr double stretch = 1e-4;
+  const DilationSettings law;
+  for (const double radius : { 0.8, 1.5, 2.2 })
+  {
+    const WallStation healthy = MakeWallStation(radius, radius, 0.0, law);
+    const double pressure = atmosphere * WallPressure(healthy, radius * (1.0 + stretch), law);
+    EXPECT_NEAR(pressure, 0.16 * stretch, 0.005 * 0.16 * stretch);
+    Print("thin elastic tube (Laplace): E h / R, MPa", 0.16, pressure / stretch);
+    // What it gives is given back, along the same way.
+    EXPECT_EQ(PlasticOpening(healthy, 1.2 * radius), 0.0);
+  }
+}
+
 TEST(Balloon, CalciumYieldsLate)
 {
   std::array<double, 2> soft{};
