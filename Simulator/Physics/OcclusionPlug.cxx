@@ -16,11 +16,12 @@ constexpr double MostWay = 0.2; // mm in a step
 
 OcclusionPlug::OcclusionPlug(const Occlusion& occlusion, const std::vector<Vector3>& axis)
   : Filled(occlusion)
-  , Next(occlusion.points.size())
 {
-  this->BeginFrame(axis, 1.0);
-  this->Current = this->Next;
-  this->SetTime(0.0);
+  for (const std::int64_t point : occlusion.points)
+  {
+    this->Next.push_back(axis[point]);
+  }
+  this->BeginFrame(axis, 1.0); // at rest
 }
 
 void OcclusionPlug::BeginFrame(const std::vector<Vector3>& axis, double seconds)
