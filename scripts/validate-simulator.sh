@@ -29,7 +29,7 @@ for argument in "$@"; do
   esac
 done
 build="${build:-$(dirname "${BASH_SOURCE[0]}")/../build/paraview}"
-tests=(UnitTestCosseratRod UnitTestGuideInAorta UnitTestGuideFromArch UnitTestBalloon UnitTestStent UnitTestOcclusion UnitTestMicrocatheter UnitTestWireInGuide UnitTestCoronaryFlow UnitTestIschaemia UnitTestVesselTears UnitTestContrastTracers UnitTestContrastModel UnitTestCArm
+tests=(UnitTestCosseratRod UnitTestGuideInAorta UnitTestBalloon UnitTestStent UnitTestOcclusion UnitTestMicrocatheter UnitTestWireInGuide UnitTestCoronaryFlow UnitTestIschaemia UnitTestVesselTears UnitTestContrastTracers UnitTestContrastModel UnitTestCArm
   UnitTestAttenuation UnitTestXRayProjectors UnitTestDetector UnitTestAcquisition UnitTestExposureControl UnitTestMovingParts UnitTestThoraxPhantom)
 soak="$build/bin/soak-intervention"
 if [ ! -x "$soak" ]; then
